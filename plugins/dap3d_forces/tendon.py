@@ -4,7 +4,16 @@ from typing import ClassVar
 
 from dap3d_core.interface import hookimpl, numbers, vectors
 from dap3d_core.interface import points as places
-from dap3d_core.kernels import add, by_body, cross, dot, scale, sub, where
+from dap3d_core.kernels import (
+    add,
+    by_body,
+    cable_length,
+    cable_pulls,
+    cable_rate,
+    cable_spans,
+    cross,
+    scale,
+)
 from dap3d_forces.actuator import kept
 from dap3d_forces.bounds import within
 from dap3d_forces.tendon_law import (
@@ -15,12 +24,9 @@ from dap3d_forces.tendon_law import (
     passive,
     stored,
 )
-from dap3d_forces.wrapping import length_of, wrapped
+from dap3d_joints.tendon import check_drums
 
 interface_version = 1
-
-#: Of ``ways``.
-PAST_SIDE, INSIDE = 1.0, 2.0
 
 
 class Tendon(TendonLaw):
@@ -72,34 +78,30 @@ class Tendon(TendonLaw):
                                                          strict=True)]
                  for name in ("points", "drums", "sides")}  # fmt: skip
         axes = [pose.to_global(a) for a, pose in zip(self.axes, bodies["axes"], strict=True)]
-        check_drums(self)
-        if any(
-            one is not other for one, other in zip(bodies["axes"], bodies["drums"], strict=False)
-        ):
-            raise ValueError("axes should lie on the bodies of their drums, the first ones")
+        check_drums(self, bodies)
         drums = found["drums"], self.radii, axes, found["sides"]
-        path = spans(found["points"], *drums, self.after, self.ways, self.divisors)
-        return numbers_of(self, total(path))
+        path = cable_spans(found["points"], *drums, self.after, self.ways, self.divisors)
+        return numbers_of(self, cable_length(path))
 
     def wrench(r_points, s_points, v_points, on_points, body_count, r_drums, s_drums, v_drums,
                w_drums, on_drums, axes, r_sides, radii, after, ways, divisors, spring):  # fmt: skip
-        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
-        T = passive(total(path), rate_of(path, v_points, v_drums, w_drums), spring)
+        path = cable_spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        T = passive(cable_length(path), cable_rate(path, v_points, v_drums, w_drums), spring)
         return acting(T, path, s_points, on_points, s_drums, on_drums, body_count)
 
     def tension(r_points, v_points, r_drums, v_drums, w_drums, axes, r_sides, radii, after, ways,
                 divisors, spring):  # fmt: skip
-        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
-        return passive(total(path), rate_of(path, v_points, v_drums, w_drums), spring)
+        path = cable_spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        return passive(cable_length(path), cable_rate(path, v_points, v_drums, w_drums), spring)
 
     def energy(r_points, r_drums, axes, r_sides, radii, after, ways, divisors, spring):
-        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
-        return stored(total(path), spring)
+        path = cable_spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        return stored(cable_length(path), spring)
 
     def switch(r_points, r_drums, axes, r_sides, radii, after, ways, divisors, spring):
-        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        path = cable_spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
         changes = [x for _, _, drum, way in path if drum is not None for x in way[5:]]
-        return total(path) - spring[0], *(x for x in changes if x is not None)
+        return cable_length(path) - spring[0], *(x for x in changes if x is not None)
 
 
 class Driven(Tendon, activation="none", control=True):
@@ -110,8 +112,8 @@ class Driven(Tendon, activation="none", control=True):
     def wrench(r_points, s_points, v_points, on_points, body_count, r_drums, s_drums, v_drums,
                w_drums, on_drums, axes, r_sides, radii, after, ways, divisors, spring, control,
                control_min, control_max, gain, bias, tension_min, tension_max):  # fmt: skip
-        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
-        T = passive(total(path), rate_of(path, v_points, v_drums, w_drums), spring)
+        path = cable_spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        T = passive(cable_length(path), cable_rate(path, v_points, v_drums, w_drums), spring)
         T = T + bias + gain * within(control, control_min, control_max)
         T = within(T, tension_min, tension_max)
         return acting(T, path, s_points, on_points, s_drums, on_drums, body_count)
@@ -119,8 +121,8 @@ class Driven(Tendon, activation="none", control=True):
     def tension(r_points, v_points, r_drums, v_drums, w_drums, axes, r_sides, radii, after, ways,
                 divisors, spring, control, control_min, control_max, gain, bias, tension_min,
                 tension_max):  # fmt: skip
-        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
-        T = passive(total(path), rate_of(path, v_points, v_drums, w_drums), spring)
+        path = cable_spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        T = passive(cable_length(path), cable_rate(path, v_points, v_drums, w_drums), spring)
         T = T + bias + gain * within(control, control_min, control_max)
         return within(T, tension_min, tension_max)
 
@@ -138,15 +140,15 @@ class Lagging(Tendon, activation="lag"):
     def wrench(r_points, s_points, v_points, on_points, body_count, r_drums, s_drums, v_drums,
                w_drums, on_drums, axes, r_sides, radii, after, ways, divisors, spring, z, gain,
                bias, tension_min, tension_max):  # fmt: skip
-        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
-        T = passive(total(path), rate_of(path, v_points, v_drums, w_drums), spring)
+        path = cable_spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        T = passive(cable_length(path), cable_rate(path, v_points, v_drums, w_drums), spring)
         T = within(T + bias + gain * z, tension_min, tension_max)
         return acting(T, path, s_points, on_points, s_drums, on_drums, body_count)
 
     def tension(r_points, v_points, r_drums, v_drums, w_drums, axes, r_sides, radii, after, ways,
                 divisors, spring, z, gain, bias, tension_min, tension_max):  # fmt: skip
-        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
-        T = passive(total(path), rate_of(path, v_points, v_drums, w_drums), spring)
+        path = cable_spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        T = passive(cable_length(path), cable_rate(path, v_points, v_drums, w_drums), spring)
         return within(T + bias + gain * z, tension_min, tension_max)
 
 
@@ -168,86 +170,23 @@ class Muscle(Lagging, activation="muscle"):
     def wrench(r_points, s_points, v_points, on_points, body_count, r_drums, s_drums, v_drums,
                w_drums, on_drums, axes, r_sides, radii, after, ways, divisors, spring, z, muscle,
                tension_min, tension_max):  # fmt: skip
-        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
-        L, L_dot = total(path), rate_of(path, v_points, v_drums, w_drums)
+        path = cable_spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        L, L_dot = cable_length(path), cable_rate(path, v_points, v_drums, w_drums)
         T = passive(L, L_dot, spring) + contracted(L, L_dot, z, muscle)
         T = within(T, tension_min, tension_max)
         return acting(T, path, s_points, on_points, s_drums, on_drums, body_count)
 
     def tension(r_points, v_points, r_drums, v_drums, w_drums, axes, r_sides, radii, after, ways,
                 divisors, spring, z, muscle, tension_min, tension_max):  # fmt: skip
-        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
-        L, L_dot = total(path), rate_of(path, v_points, v_drums, w_drums)
+        path = cable_spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        L, L_dot = cable_length(path), cable_rate(path, v_points, v_drums, w_drums)
         T = passive(L, L_dot, spring) + contracted(L, L_dot, z, muscle)
         return within(T, tension_min, tension_max)
 
 
-def check_drums(tendon):
-    """Refuse lists of drums that contradict each other.
-
-    Raises:
-        ValueError: they do.
-    """
-    last, count = len(tendon.points) - 1, len(tendon.drums)
-    if not all(x in range(1, last + 1) for x in tendon.after):
-        raise ValueError(f"after should have a number from 1 to {last} for each drum")
-    if len(set(tendon.after)) < count:
-        raise ValueError("after has one point twice; give a point between two drums")
-    if len(tendon.axes) > count or len(tendon.sides) not in (0, count):
-        raise ValueError("there should be as many sides as drums, or none, and no more axes")
-    if not all(x in (0.0, 2.0) or (x == PAST_SIDE and tendon.sides) for x in tendon.ways):
-        raise ValueError("ways should be 0, 1 with sides, or 2 for each drum")
-    if not all(x >= 0.0 for x in tendon.divisors):
-        raise ValueError("divisors should not be below 0")
-
-
-def spans(r, drums, radii, axes, sides, after, ways, divisors):
-    """Of each span: its first point, its share in the length, its drum or None, and its way."""
-    found = []
-    for k in range(len(r) - 1):
-        drum = after.index(k + 1.0) if k + 1.0 in after else None
-        if divisors[k] == 0.0:
-            continue
-        if drum is None:
-            l, u = length_of(sub(r[k + 1], r[k]))
-            way = (l, u, u)
-        else:
-            axis = axes[drum] if drum < len(axes) else None
-            side = sides[drum] if sides and ways[drum] == PAST_SIDE else None
-            way = wrapped(r[k], r[k + 1], drums[drum], radii[drum], axis, side,
-                          inside=ways[drum] == INSIDE)  # fmt: skip
-        found.append((k, 1.0 / divisors[k], drum, way))
-    return found
-
-
-def total(path):
-    """The length L, m."""
-    return sum(share * way[0] for _, share, _, way in path)
-
-
-def pulls(path):
-    """The forces of a tension of 1: of each its point or drum, the arm from there, the force."""
-    at_points, at_drums = [], []
-    for k, share, drum, way in path:
-        u, v = scale(share, way[1]), scale(-share, way[2])
-        at_points += [(k, u), (k + 1, v)]
-        if drum is not None:  # where it does not touch, the two forces are opposite
-            touches = way[5] > 0.0
-            P, Q = (tuple(where(touches, x, 0.0) for x in arm) for arm in way[3:5])
-            at_drums += [(drum, P, scale(-1.0, u)), (drum, Q, scale(-1.0, v))]
-    return at_points, at_drums
-
-
-def rate_of(path, v, v_drums, w_drums):
-    """The rate of L, m/s: less the power of a tension of 1."""
-    at_points, at_drums = pulls(path)
-    power = sum(dot(F, v[k]) for k, F in at_points)
-    return -power - sum(dot(F, add(v_drums[b], cross(w_drums[b], arm))) for b, arm, F in at_drums)
-
-
 def acting(T, path, s, on_points, s_drums, on_drums, body_count):
     """The wrench of a tension on each body."""
-    at_points, at_drums = pulls(path)
+    at_points, at_drums = cable_pulls(path)
     parts = [(on_points[k], s[k], F) for k, F in at_points]
     parts += [(on_drums[b], add(s_drums[b], arm), F) for b, arm, F in at_drums]
     forces = [(on, s, scale(T, F)) for on, s, F in parts]

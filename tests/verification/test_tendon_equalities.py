@@ -12,7 +12,9 @@ from support.plain import long_in_plain_python
 import dap3d_core as dap
 
 MODEL = """<mujoco><worldbody><site name="hook" pos="-0.3 0.1 0.4"/>
+<geom name="post" type="cylinder" size="0.15 1" pos="0 0.2 0.2" euler="80 10 0"/>
 <body name="a"><joint name="p" axis="0 1 0"/><geom size="0.1" pos="0.5 0.1 0"/>
+  <site name="mid" pos="0.3 0.2 -0.1"/><geom name="ball" size="0.1" pos="0.6 0.1 -0.1"/>
   <body name="b" pos="0.5 0 0"><joint name="q" axis="0 1 0.2"/><geom size="0.08" pos="0.3 0.1 0"/>
     <body name="c" pos="0.4 0 0"><joint name="s" type="slide" axis="1 0 0.2"/>
       <geom size="0.06" pos="0.1 0 0.1"/><site name="end" pos="0.1 0.1 -0.2"/></body></body></body>
@@ -21,16 +23,18 @@ MODEL = """<mujoco><worldbody><site name="hook" pos="-0.3 0.1 0.4"/>
 <fixed name="t"><joint joint="p" coef="1"/><joint joint="q" coef="-2"/><joint joint="s" coef="3"/>
 </fixed><fixed name="x"><joint joint="u" coef="1.5"/><joint joint="p" coef="0.3"/></fixed>
 <spatial name="l"><site site="hook"/><site site="end"/></spatial>
+<spatial name="w"><site site="hook"/><geom geom="post"/><site site="mid"/><pulley divisor="2"/>
+<site site="mid"/><geom geom="ball"/><site site="end"/></spatial>
 </tendon><equality><tendon {equality}/></equality></mujoco>"""
 
 
 @pytest.mark.parametrize(
     ("equality", "ratio"),
     [('tendon1="t"', 0.0), ('tendon1="t" tendon2="x" polycoef="0 0.7 0 0 0"', 0.7),
-     ('tendon1="x"', 0.0), ('tendon1="l"', 0.0)],
+     ('tendon1="x"', 0.0), ('tendon1="l"', 0.0), ('tendon1="w"', 0.0)],
 )  # fmt: skip
 def test_accelerations(tmp_path, equality, ratio):
-    """Of three joints, of two tendons with one in common, of two joints, of two points."""
+    """Of three joints, of two tendons with one in common, of two joints, two points, over drums."""
     pytest.importorskip("mujoco")
     path = tmp_path / "a.xml"
     path.write_text(MODEL.format(equality=equality))
@@ -39,7 +43,7 @@ def test_accelerations(tmp_path, equality, ratio):
     mujoco.mj_forward(m, d)
     row, M = np.zeros(m.nv), np.zeros((m.nv, m.nv))
     mujoco.mj_fullM(m, d, M)
-    for k, one in enumerate("txl"):
+    for k, one in enumerate("txlw"):
         share = 1.0 if f'tendon1="{one}"' in equality else -ratio * (f'tendon2="{one}"' in equality)
         for column in range(m.nv):
             h = 1e-6 * np.eye(m.nv)[column]
@@ -79,7 +83,7 @@ def test_a_sum_stays_where_it_starts(tmp_path):
 def test_of_longer_paths_it_is_left_out(tmp_path):
     path = tmp_path / "a.xml"
     path.write_text(MODEL.format(equality='tendon1="t" tendon2="l"'))
-    assert any("equality of tendons" in one.text for one in dap.import_model(path)[1].left_out)
+    assert any("equality of two tendons" in one.text for one in dap.import_model(path)[1].left_out)
 
 
 @pytest.mark.parametrize("wheels", [3, 6])

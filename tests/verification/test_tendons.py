@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import dap3d_core as dap
+from dap3d_core.kernels import wrapped
 from dap3d_forces.tendon_law import activated, contracted
-from dap3d_forces.wrapping import wrapped
 
 R = 0.2
 Z = (0.0, 0.0, 1.0)
@@ -153,3 +153,28 @@ def test_a_joint_tendon_keeps_its_length_through_impacts(e):
     x, angle = (result.quantity(name).values[-1] for name in ("line.x", "pin.angle"))
     assert angle == pytest.approx(np.arcsin(0.03 / 0.2), rel=1e-9)
     assert abs(x - angle) < h**2 * 9.81 * 0.1 / 0.03
+
+
+@pytest.mark.parametrize("contacts", [False, True])
+def test_a_load_hangs_at_the_limit_of_a_wrapped_tendon(tmp_path, contacts):
+    """A slide falls until the tendon is 1.2 m: by events and by stepping.
+
+    Two tangents of length t and an arc make the length, of points at distances l from the axis.
+    """
+    path = tmp_path / "a.xml"
+    path.write_text("""<mujoco><worldbody><site name="hook" pos="-0.3 0 0.4"/>
+        <geom name="post" type="cylinder" size="0.1 0.3" euler="90 0 0" contype="0"/>
+        <body pos="0.5 0 0.4"><joint name="p" type="slide" axis="0 0 1"/><geom size="0.05"/>
+        <site name="end"/></body></worldbody><tendon><spatial range="0.3 1.2"><site site="hook"/>
+        <geom geom="post"/><site site="end"/></spatial></tendon></mujoco>""")
+    scene, report = dap.import_model(path, contacts=contacts)
+    assert not [one for one in report.left_out if one.motion]
+    steps = {"contact_step": 2e-3} if contacts else {}
+    result = dap.simulate(scene, t_end=1.0, dt=0.5, **steps)
+    A, B = np.array([-0.3, 0.4]), np.array([0.5, result.r[-1, 0, 2]])
+    l_a, l_b = np.hypot(*A), np.hypot(*B)
+    arc = np.arccos(A @ B / (l_a * l_b)) - np.arccos(0.1 / l_a) - np.arccos(0.1 / l_b)
+    assert arc > 0.1
+    length = np.sqrt(l_a**2 - 0.01) + np.sqrt(l_b**2 - 0.01) + 0.1 * arc
+    assert length == pytest.approx(1.2, abs=1e-8)
+    assert np.abs(result.rd[-1, 0]).max() < 1e-8

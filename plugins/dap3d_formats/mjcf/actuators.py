@@ -18,6 +18,7 @@ from dap3d_core.interface.formats import (
     XmlElement,
 )
 from dap3d_formats.mjcf.keyframes import Keyframe, actuators_of
+from dap3d_formats.mjcf.length_range import length_range
 from dap3d_formats.mjcf.reader import MjcfReader
 from dap3d_formats.mjcf.tendons import SCALAR, line_of, tendon_of
 
@@ -146,7 +147,7 @@ class ActuatorReader:
         number = dict(zip(MUSCLE, _muscle_numbers(element), strict=True))
         (at_low, at_high), (force,) = number["range"], number["force"]
         if not low < high or not at_low < at_high:
-            return "a muscle without lengthrange, not of joints with limits alone"
+            return "a muscle without lengthrange, of joints without limits: give lengthrange"
         if force < 0.0:
             return "a muscle whose force is scaled by the mass matrix"
         gear = element.numbers("gear", None, (1.0,))[0]
@@ -175,16 +176,13 @@ class ActuatorReader:
         return ""
 
     def _length_range(self, element: XmlElement, line: Tendon) -> Bounds:
-        """The lengths of the actuator at its ends; of joints without them by their limits."""
+        """The least and greatest length of the actuator, given or where joints may go."""
         if "lengthrange" in element.attributes:
             low, high = element.numbers("lengthrange", 2)
             return low, high
-        gear, ends = element.numbers("gear", None, (1.0,))[0], np.zeros(2)
-        for name, factor in line.terms:
-            joint = self.reader.model.joints[name]
-            q = np.array([joint.limits[0].lower, joint.limits[0].upper]) + joint.reference
-            ends += np.sort(gear * factor * q) if gear * factor else 0.0
-        return (float(ends[0]), float(ends[1])) if np.isfinite(ends).all() else (0.0, 0.0)
+        gear, ends = element.numbers("gear", None, (1.0,))[0], length_range(self.reader, line)
+        low, high = sorted(gear * end for end in ends)
+        return low, high
 
     def _name(self, element: XmlElement) -> str:
         names = {one.name for one in self.reader.model.actuators}

@@ -1,7 +1,6 @@
 """Equalities of MJCF."""
 
 import attrs
-import numpy as np
 
 from dap3d_core.interface.formats import (
     WORLD,
@@ -14,6 +13,7 @@ from dap3d_core.interface.formats import (
     XmlElement,
     from_quaternion,
     held,
+    length_of_line,
 )
 from dap3d_formats.mjcf.reader import MjcfReader
 from dap3d_formats.mjcf.tendons import line_of, pose_of, tendon_of
@@ -123,14 +123,12 @@ def _couple_by_tendon(reader: MjcfReader, element: XmlElement) -> None:
     if len(found) < len(lines):
         return
     name = element.get("name") or found[0].name
-    two_points = len(found[0].points) == 2 and not (found[0].drums or found[0].divisors)
-    if len(found) == 1 and two_points:
-        ends = [(pose_of(reader, link) @ Frame(at)).r for link, at in found[0].points]
-        length = float(np.linalg.norm(ends[1] - ends[0])) + a0
+    if len(found) == 1 and found[0].points:
+        length = length_of_line(found[0], lambda link: pose_of(reader, link)) + a0
         reader.model.held.append(attrs.evolve(found[0], name=name, rest=length, place=place))
         return
     if any(line.points for line in found) or (len(found) == 2 and any(higher)):
-        text = "an equality of tendons over more than two points, of two not fixed, or with"
+        text = "an equality of two tendons that are not fixed, or with"
         remarks.leave_out(place, f"{text} a polynomial of a higher degree", motion=True)
         return
     factors: dict[str, float] = {}

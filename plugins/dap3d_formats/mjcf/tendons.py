@@ -14,6 +14,7 @@ from dap3d_core.interface.formats import (
     XmlElement,
     from_quaternion,
     held,
+    length_of_line,
 )
 from dap3d_formats.mjcf.reader import MjcfReader
 
@@ -112,21 +113,12 @@ def _drum(reader: MjcfReader, part: XmlElement, after: int) -> Drum:
     return Drum(link, frame, radius, after, shape.kind == "cylinder", side, inside)
 
 
-def _drawn(reader: MjcfReader, line: Tendon) -> float | None:
-    """The length where the springs of all joints are at rest; None over drums."""
+def _drawn(reader: MjcfReader, line: Tendon) -> float:
+    """The length where the springs of all joints are at rest."""
     if line.terms:
         joints = [(reader.model.joints[name], factor) for name, factor in line.terms]
         return sum(factor * (joint.rest[0] + joint.reference) for joint, factor in joints)
-    if line.drums:
-        text = "the rest length of a tendon over geoms is that where the scene starts"
-        reader.document.source.remarks.translate(line.place, text)
-        return None
-    places = np.array(
-        [(pose_of(reader, link, at_rest=True) @ Frame(at)).r for link, at in line.points]
-    )
-    lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    counts = [1.0 / d if d else 0.0 for d in line.divisors[:-1]] or 1.0
-    return float((lengths * counts).sum())
+    return length_of_line(line, lambda link: pose_of(reader, link, at_rest=True))
 
 
 def pose_of(reader: MjcfReader, link: str, *, at_rest: bool = False) -> Frame:

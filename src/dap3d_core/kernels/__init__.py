@@ -57,6 +57,14 @@ from dap3d_core.kernels.vectors import (
 
 if TYPE_CHECKING:
     from dap3d_core.kernels.eliminate_unknowns import root
+    from dap3d_core.kernels.wrapping import (
+        cable_bending,
+        cable_length,
+        cable_pulls,
+        cable_rate,
+        cable_spans,
+        wrapped,
+    )
 
 __all__ = [
     "abs",
@@ -66,6 +74,11 @@ __all__ = [
     "atan",
     "atan2",
     "by_body",
+    "cable_bending",
+    "cable_length",
+    "cable_pulls",
+    "cable_rate",
+    "cable_spans",
     "conjugate",
     "cos",
     "cosh",
@@ -104,13 +117,20 @@ __all__ = [
     "tanh",
     "transpose",
     "where",
+    "wrapped",
 ]
+#: Those that few kernels need.
+_WRAPPING = ("cable_bending", "cable_length", "cable_pulls", "cable_rate", "cable_spans", "wrapped")
 
 
 def __getattr__(name: str) -> Any:
-    """``root``, which few kernels need, with its module."""
-    if name != "root":
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from dap3d_core.kernels import eliminate_unknowns
+    """``root``, and the ways of cables, which few kernels need, with their modules."""
+    if name == "root":
+        from dap3d_core.kernels import eliminate_unknowns
 
-    return eliminate_unknowns.root
+        return eliminate_unknowns.root
+    if name not in _WRAPPING:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from dap3d_core.kernels import wrapping
+
+    return getattr(wrapping, name)

@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.formats.import_scene.joints import from_ground, named_ends
+from dap3d_core.formats.import_scene.joints import LIGHT, from_ground, named_ends
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, float_tuple
+from dap3d_core.formats.import_scene.start import AGREE
 from dap3d_core.interface.formats.articulation import Actuator, Articulation, Tendon
 from dap3d_core.interface.formats.frames import Frame
+from dap3d_core.interface.formats.tendon_length import length_of_line
 from dap3d_core.scene.tables import GROUND
 
 #: Time constant of soft stops of tendons, s.
@@ -149,7 +151,10 @@ def add_tendons(builder: SceneBuilder, model: Articulation) -> None:
             fields, spring["l0"] = ends, tendon.rest or None
         else:
             keyword = "tendon" if keyword == "ptp" else keyword
-            _add_stops(builder, model, tendon, keyword, fields)
+            if tendon.terms:
+                _add_stops(builder, model, tendon, keyword, fields)
+            else:
+                _add_slider(builder, tendon, dict(fields))
             spring |= {"length": tendon.rest, "play": tendon.play or None}
         if tendon.stiffness or tendon.damping:
             name = builder.names.free("forces", f"{tendon.name}_spring")
@@ -246,7 +251,7 @@ def _add_stops(
         factors[name] = factors.get(name, 0.0) + factor
     inertia = builder.inertia.of_sum(factors) if factors else None
     if builder.limits == "off" or inertia is None:
-        text = "limits of tendons over more than two points, with limits = off, or without inertia"
+        text = "limits of sums of joints, with limits = off, or without inertia"
         builder.remarks.leave_out(tendon.place, text, motion=True)
         return
     text = "limits of tendons are soft stops, critically damped, of a time constant of 2 ms"
@@ -262,12 +267,48 @@ def _add_stops(
 
 
 def _add_limits(builder: SceneBuilder, tendon: Tendon, ends: dict[str, str]) -> None:
-    """Add rigid stops at the limits of a tendon."""
-    if tendon.limits.finite and (builder.limits == "off" or not builder.takes_contacts):
-        text = "limits of tendons, with limits = off or method joint"
-        builder.remarks.leave_out(tendon.place, text, motion=True)
-        return
+    """Add rigid stops at the limits of a tendon between two points."""
     for side, bound in (("min", tendon.limits.lower), ("max", tendon.limits.upper)):
-        if isfinite(bound) and bound > 0.0:
+        if _limits(builder, tendon) and isfinite(bound) and bound > 0.0:
             name = builder.names.free("forces", f"{tendon.name}_{side}_stop")
             builder.scene.add_force("ptp_stop", name, **ends, side=side, l_stop=bound)
+
+
+def _limits(builder: SceneBuilder, tendon: Tendon) -> bool:
+    """True for a tendon with rigid limits; those that cannot be are left out, remarked."""
+    if not tendon.limits.finite:
+        return False
+    if builder.limits != "off" and builder.takes_contacts:
+        return True
+    text = "limits of tendons, with limits = off or method joint"
+    builder.remarks.leave_out(tendon.place, text, motion=True)
+    return False
+
+
+def _add_slider(builder: SceneBuilder, tendon: Tendon, fields: dict[str, Any]) -> None:
+    """Add a light slider that rises as a tendon lengthens, with its limits, which are rigid."""
+    if not _limits(builder, tendon):
+        return
+    text = "limits of tendons are those of a slider, with a millionth of the mass that they move"
+    builder.remarks.translate(tendon.place, text)
+    scene, names, limits = builder.scene, builder.names, tendon.limits
+    links = [link for link, _ in tendon.points] + [drum.link for drum in tendon.drums]
+    masses = [builder.groups[builder.member[link][0]].inertial.mass for link in links]
+    slider = names.free("bodies", f"{tendon.name}_slider")
+    start = length_of_line(tendon, builder.pose_of)
+    if not limits.lower - AGREE <= start <= limits.upper + AGREE:
+        text = "a tendon starts beyond its limits: they hold it where it starts"
+        builder.remarks.translate(tendon.place, text, motion=True)
+    mass = LIGHT * min(mass for mass in masses if mass)
+    scene.add_body(slider, mass=mass, Jp=(mass,) * 3, r=(0.0, 0.0, start))
+    scene.add_joint(
+        "tran", names.free("joints", f"{slider}_rail"), P_i=f"{slider}.O", P_j="ground.O",
+        a_j="ground.z",
+        lower=min(limits.lower - start, 0.0) if limits.lower > 0.0 else None,
+        upper=max(limits.upper - start, 0.0) if isfinite(limits.upper) else None,
+    )  # fmt: skip
+    name = names.free("joints", f"{tendon.name}_length")
+    fields |= {"points": (*fields["points"], "ground.O", f"{slider}.O"),
+               "divisors": (*(tendon.divisors or (1.0,) * len(links))[: len(tendon.points) - 1],
+                            0.0, -1.0, 1.0)}  # fmt: skip
+    scene.add_joint("tendon", name, **fields)

@@ -18,6 +18,9 @@ def add_held(builder: SceneBuilder, model: Articulation) -> None:
             name = builder.names.free("joints", tendon.name)
             ends = dict(zip(("P_i", "P_j"), fields["points"], strict=True))
             builder.scene.add_joint("sph-sph", name, **ends, length=tendon.rest)
+        elif keyword == "tendon":
+            name = builder.names.free("joints", tendon.name)
+            builder.scene.add_joint("tendon", name, **fields, length=tendon.rest)
         elif keyword and len(fields["movers"]) > 1:
             _hold_sum(builder, model, tendon, fields)
         else:

@@ -7,10 +7,11 @@ import attrs
 from dap3d_core.formats.import_scene.names import Names
 from dap3d_core.formats.import_scene.rigid_groups import RigidGroup
 from dap3d_core.interface.formats.articulation import WORLD, Contact, Joint
-from dap3d_core.interface.formats.frames import Frame
+from dap3d_core.interface.formats.frames import IDENTITY, Frame, from_quaternion
 from dap3d_core.interface.formats.joint_inertia import JointInertia
 from dap3d_core.interface.formats.remarks import Remarks
 from dap3d_core.scene.scene import Scene
+from dap3d_core.scene.tables import GROUND
 
 
 @attrs.define(eq=False)
@@ -45,6 +46,14 @@ class SceneBuilder:
     def takes_contacts(self) -> bool:
         """True where the method takes contacts, among them rigid limits and sticking friction."""
         return bool(self.scene.simulation.method != "joint")
+
+    def pose_of(self, link: str) -> Frame:
+        """The pose of a link where the scene starts."""
+        name, frame = self.attached(link, IDENTITY)
+        if name == GROUND:
+            return frame
+        body = self.scene.bodies[name]
+        return Frame(body.r, from_quaternion(body.p)) @ frame
 
     def attached(self, link: str, frame: Frame) -> tuple[str, Frame]:
         """A frame of a link as body and frame in its axes at its mass centre."""

@@ -273,7 +273,7 @@ def _put_carried(s: StepArrays) -> None:
     own = np.array([s.mass, np.linalg.eigvalsh(s.Jp.reshape(-1, 3, 3))[:, -1]]).T
     carried, passed = own, None
     while passed is None or not np.array_equal(carried, passed):
-        light = (own < LIGHT * carried).any(axis=1)
+        light: Any = np.any(own < LIGHT * carried, axis=1)
         passed, felt = carried, np.where(light[:, None], carried, own)
         carried = felt.copy()
         for first, last in itertools.pairwise(s.row_start):

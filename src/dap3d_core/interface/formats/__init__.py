@@ -44,6 +44,7 @@ from dap3d_core.interface.formats.solids import (
     inertia_of_solid,
     total_inertia,
 )
+from dap3d_core.interface.formats.tendon_length import length_of_line
 from dap3d_core.interface.formats.xml_tree import XmlElement, parse_xml
 from dap3d_core.interface.types import INTERFACE_VERSION
 
@@ -87,6 +88,7 @@ __all__ = [
     "inertia_moved",
     "inertia_of_mesh",
     "inertia_of_solid",
+    "length_of_line",
     "parse_xml",
     "quaternion",
     "rpy",

@@ -1,0 +1,31 @@
+"""Lengths of tendons at poses of links."""
+
+from collections.abc import Callable
+
+from dap3d_core.interface.formats.articulation import Tendon
+from dap3d_core.interface.formats.frames import Frame
+from dap3d_core.kernels.wrapping import INSIDE, PAST_SIDE, cable_length, cable_spans
+
+
+def length_of_line(line: Tendon, pose_of: Callable[[str], Frame]) -> float:
+    """The length of a tendon over points and drums, m.
+
+    Args:
+        line: the tendon.
+        pose_of: the pose of a link.
+    """
+
+    def place(link: str, frame: Frame) -> tuple[float, ...]:
+        return tuple((pose_of(link) @ frame).r.tolist())
+
+    drums = sorted(line.drums, key=lambda drum: not drum.cylinder)
+    axes = [tuple((pose_of(d.link) @ d.at).A[:, 2].tolist()) for d in drums if d.cylinder]
+    sides = [d.side or (d.link, d.at.r) for d in drums]
+    ways = tuple(INSIDE if d.inside else PAST_SIDE * (d.side is not None) for d in drums)
+    path = cable_spans(
+        [place(link, Frame(at)) for link, at in line.points],
+        [place(d.link, d.at) for d in drums], [d.radius for d in drums], axes,
+        [place(link, Frame(at)) for link, at in sides], tuple(float(d.after) for d in drums), ways,
+        line.divisors or (1.0,) * len(line.points),
+    )  # fmt: skip
+    return float(cable_length(path))
