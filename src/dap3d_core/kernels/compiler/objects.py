@@ -68,12 +68,6 @@ def processor() -> Processor:
     return Processor(llvm.get_process_triple(), name or llvm.get_host_cpu_name(), features)
 
 
-@cache
-def has_fused_operations() -> bool:
-    """True if the processor multiplies and adds at once, with one rounding."""
-    return processor().triple.startswith("aarch64") or "+fma" in processor().features.split(",")
-
-
 #: Compiles a function for the processor that it is given.
 _TRIAL = """
 import sys

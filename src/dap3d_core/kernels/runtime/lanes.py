@@ -93,8 +93,7 @@ def differentiated(entry: Entry, count: int) -> Entry:
         return entry
 
     def write(symbols: list[str]) -> tuple[str, list[Any]]:
-        text, is_fused = unit.fresh_text(symbols), objects.has_fused_operations()
-        return differentiate(text, count, is_fused=is_fused), unit.results
+        return differentiate(unit.fresh_text(symbols), count), unit.results
 
     wide = unit_of(f"{unit.name}-d{count}", len(unit.symbols), write)
     wide.has_slopes = True

@@ -10,8 +10,8 @@ Code may say what differentiation by instructions does not know (``with_slopes``
 ``is_differentiated``, ``values_alone`` of intrinsics.py): these are lines with a remark.
 
 One, three, seven and fifteen slopes fill a vector with the value (within.py); others are a vector
-of their own, beside it (beside.py). What is fused is written so here, and not left to optimisation:
-the bits of slopes depend on the processor, but not on when code is optimised.
+of their own, beside it (beside.py). Slopes are neither contracted nor reassociated: their bits
+depend on no optimisation, and programs of a scene have those of general code.
 
 The text is that of this compiler (writer.py, functions.py, trace.py), one instruction a line.
 Source: A. Griewank, A. Walther, Evaluating Derivatives, 2nd ed., SIAM 2008, chapter 3.
@@ -29,42 +29,36 @@ from dap3d_core.kernels.compiler.lanes import rewritten
 _FILLING = (2, 4, 8, 16)
 
 
-def differentiate(text: str, count: int, *, is_fused: bool = False) -> str:
+def differentiate(text: str, count: int) -> str:
     """A module of LLVM IR whose floats have ``count`` - 1 derivatives, in memory behind them.
 
     Args:
         text: of the module.
         count: numbers for each float.
-        is_fused: products of slopes are added with one rounding, which is fast only on processors
-            that can (``has_fused_operations`` of objects.py).
 
     Raises:
         CompileError: it calls a function without a derivative.
     """
     if count in _FILLING:
         lanes = count
-        lines = list(
-            rewritten(text, lambda external: WithinWriter(count, external, is_fused=is_fused))
-        )
+        lines = list(rewritten(text, lambda external: WithinWriter(count, external)))
     else:
         lanes = count - 1
-        lines = list(_beside(text, lanes, is_fused=is_fused))
+        lines = list(_beside(text, lanes))
     called = set(re.findall(r"call double @(\w[\w.]*)\(", "\n".join(lines)))
     declared = set(re.findall(r"^declare double @(\w[\w.]*)\(", text, re.MULTILINE))
     for function in sorted(called - declared):
         takes = "double, double" if function == "pow" else "double"
         kind = "" if function.startswith("llvm.") else PURE
         lines.append(f"declare double @{function}({takes}){kind}")
-    vector = f"<{lanes} x double>"
-    lines.append(f"declare {vector} @llvm.fma.v{lanes}f64({vector}, {vector}, {vector})")
     return "\n".join([*lines, ""])
 
 
-def _beside(text: str, lanes: int, *, is_fused: bool) -> Iterator[str]:
+def _beside(text: str, lanes: int) -> Iterator[str]:
     """The lines of a module with slopes beside values."""
     external = set(re.findall(r"^declare double @(\w[\w.]*)\(", text, re.MULTILINE))
     for part in re.split(r"^(?=define )", text, flags=re.MULTILINE):
         lines = part.splitlines()
-        writer = BesideWriter(lanes, external, lines, is_fused=is_fused)
+        writer = BesideWriter(lanes, external, lines)
         for line in lines:
             yield from writer.lines(line)

@@ -1,12 +1,10 @@
 """Slopes beside values: a vector of slopes for each float, whose value stays a number.
 
 The instructions of the program stay as they are. An item of an array is followed by its slopes.
-Numbers that come of no array have no slopes, which are not computed then. A product that only a sum
-takes is added to its slopes without being made by itself.
+Numbers that come of no array have no slopes, which are not computed then.
 """
 
 import re
-from collections import Counter
 
 from dap3d_core.kernels.compiler.derivatives.instructions import (
     DOUBLE,
@@ -18,7 +16,6 @@ from dap3d_core.kernels.compiler.types import CompileError
 from dap3d_core.kernels.compiler.writer import DIFFERENTIATED, SLOPES, VALUES
 
 _NUMBER = re.compile(r"double ([^\s,)]+)")
-_NAME = re.compile(r"%[\w.]+")
 _BINARY = re.compile(r"f(add|sub|mul|div) double (\S+), (\S+)")
 _SELECTED = re.compile(r"select i1 (\S+), double (\S+), double (\S+)( ; .*)?")
 _CALL = re.compile(r"(  )?call (.+?) ([@%][\w.]+)\((.*?)\)(.*)")
@@ -34,35 +31,23 @@ _PLAIN = re.compile(r"(fcmp \w+|fptosi) double|[su]itofp ")
 class BesideWriter(Instructions):
     """Rewrites the lines of one function."""
 
-    def __init__(self, lanes: int, external: set[str], lines: list[str], *, is_fused: bool) -> None:
+    def __init__(self, lanes: int, external: set[str], lines: list[str]) -> None:
         """Args:
         lanes: slopes of a float.
-        external, is_fused: as of ``Instructions``.
+        external: as of ``Instructions``.
         lines: of the function.
         """
-        super().__init__(lanes, external, is_fused=is_fused)
+        super().__init__(lanes, external)
         self._pair = f"{{double, {self.vector}}}"
         self._has_slopes = not any(line.endswith(VALUES) for line in lines)
         #: Vectors of slopes by the names of numbers; those of others are zero.
         self._slopes: dict[str, str] = {}
         self._slots: set[str] = set()
-        #: What is known in the present block: numbers in slots, factors of products.
+        #: Numbers in slots, as known in the present block.
         self._held: dict[str, str] = {}
-        self._products: dict[str, tuple[str, str]] = {}
-        #: How often names occur, once where they are defined.
-        self._occurs = Counter(word for line in lines for word in _NAME.findall(line))
 
     def _zero_or(self, word: str) -> str:
         return self._slopes.get(word, "zeroinitializer")
-
-    def _sum_of_product(
-        self, a: str, factors: tuple[str, str], *, is_negative: bool = False
-    ) -> str:
-        """Slopes a and those of a product, or less these; "" for zero."""
-        for x, factor in (factors, factors[::-1]):
-            if slopes := self._slopes.get(x):
-                a = self.total(a, slopes, factor, is_negative=is_negative)
-        return a
 
     # ------------------------------------------------------------------ instructions
 
@@ -72,7 +57,7 @@ class BesideWriter(Instructions):
         found = RESULT.fullmatch(line)
         name, text = found.groups() if found else ("", line)
         if line.endswith(":"):
-            self._held, self._products, self._splats = {}, {}, {}
+            self._held, self._splats = {}, {}
             self.out.append(line)
         elif line.startswith("define "):
             self._define(line)
@@ -163,10 +148,7 @@ class BesideWriter(Instructions):
 
     def _load(self, name: str, at: str) -> None:
         if at in self._held:
-            number = self._held[at]
-            self._keep(name, self._slopes.get(number))
-            if factors := self._fused(number):
-                self._products[name] = factors
+            self._keep(name, self._slopes.get(self._held[at]))
         elif self._has_slopes:
             self._keep(name, self.new(f"load {self.vector}, ptr {self._place(at)}, align 8"))
 
@@ -177,8 +159,11 @@ class BesideWriter(Instructions):
             self._held[at] = word
 
     def _mul(self, name: str, a: str, b: str) -> str:
-        self._products[name] = a, b
-        return self._sum_of_product("", (a, b))
+        slopes = ""
+        for x, factor in ((a, b), (b, a)):
+            if x in self._slopes:
+                slopes = self.total(slopes, self._slopes[x], factor)
+        return slopes
 
     def _div(self, name: str, a: str, b: str) -> str:
         """(a / b)' = (a' - (a / b) b') / b."""
@@ -187,29 +172,15 @@ class BesideWriter(Instructions):
             slopes = self.total(slopes, by, name, is_negative=True)
         return slopes and self.lanewise("fmul", slopes, self.splat(self.number("fdiv", ONE, b)))
 
-    def _fused(self, word: str) -> tuple[str, str] | None:
-        """Factors of a product of which nothing else is made."""
-        is_one = self.is_fused and self._occurs[word] == 2
-        return self._products.get(word) if is_one else None
-
     def _add(self, name: str, a: str, b: str) -> str:
-        if not self._fused(b):
-            a, b = b, a
-        before = self._slopes.get(a, "")
-        if factors := self._fused(b):
-            return self._sum_of_product(before, factors)
-        after = self._slopes.get(b, "")
-        return self.lanewise("fadd", before, after) if before and after else before or after
+        one, other = self._slopes.get(a, ""), self._slopes.get(b, "")
+        return self.lanewise("fadd", one, other) if one and other else one or other
 
     def _sub(self, name: str, a: str, b: str) -> str:
-        before, after = self._slopes.get(a, ""), self._slopes.get(b, "")
-        if factors := self._fused(b):
-            return self._sum_of_product(before, factors, is_negative=True)
-        if not before or not after:
-            return before or (after and self.lanewise("fneg", after))
-        if factors := self._fused(a):
-            return self._sum_of_product(self.lanewise("fneg", after), factors)
-        return self.lanewise("fsub", before, after)
+        one, other = self._slopes.get(a, ""), self._slopes.get(b, "")
+        if not one or not other:
+            return one or (other and self.lanewise("fneg", other))
+        return self.lanewise("fsub", one, other)
 
     # ------------------------------------------------------------------ calls, groups of numbers
 

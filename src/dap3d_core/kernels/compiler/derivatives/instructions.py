@@ -17,13 +17,12 @@ _FLAT = ("llvm.floor.f64", "llvm.ceil.f64", "llvm.rint.f64")
 class Instructions:
     """Writes instructions of numbers and of vectors of ``lanes`` numbers."""
 
-    def __init__(self, lanes: int, external: set[str], *, is_fused: bool) -> None:
+    def __init__(self, lanes: int, external: set[str]) -> None:
         """Args:
         lanes: of a vector.
         external: functions of the C library that the module declares.
-        is_fused: products of slopes are added with one rounding.
         """
-        self.lanes, self.external, self.is_fused = lanes, external, is_fused
+        self.lanes, self.external = lanes, external
         self.vector = f"<{lanes} x double>"
         self.out: list[str] = []
         self._count = 0
@@ -64,12 +63,7 @@ class Instructions:
 
     def total(self, a: str, b: str, factor: str, *, is_negative: bool = False) -> str:
         """Vector a, zero where that is "", and vector b times a number, or less these."""
-        splat = self.splat(factor)
-        if self.is_fused and a:
-            b = self.lanewise("fneg", b) if is_negative else b
-            v = self.vector
-            return self.new(f"call {v} @llvm.fma.v{self.lanes}f64({v} {b}, {v} {splat}, {v} {a})")
-        part = self.lanewise("fmul", b, splat)
+        part = self.lanewise("fmul", b, self.splat(factor))
         if a:
             return self.lanewise("fsub" if is_negative else "fadd", a, part)
         return self.lanewise("fneg", part) if is_negative else part

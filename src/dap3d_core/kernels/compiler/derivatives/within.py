@@ -20,13 +20,13 @@ _JOINED = re.compile(rf"select i1 true, double (\S+), double (\S+) {SLOPES}")
 class WithinWriter(VectorWriter, Instructions):
     """Rewrites the lines of one function."""
 
-    def __init__(self, count: int, external: set[str], *, is_fused: bool) -> None:
+    def __init__(self, count: int, external: set[str]) -> None:
         """Args:
         count: numbers for each float.
-        external, is_fused: as of ``Instructions``.
+        external: as of ``Instructions``.
         """
         VectorWriter.__init__(self, count, external)
-        Instructions.__init__(self, count, external, is_fused=is_fused)
+        Instructions.__init__(self, count, external)
         others = [f"i32 {count + k}" for k in range(1, count)]
         self._first = f"<{count} x i32> <{', '.join(['i32 0', *others])}>"
         self._name, self._has_slopes = "", True
