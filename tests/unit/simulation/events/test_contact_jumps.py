@@ -70,13 +70,13 @@ def test_a_contact_of_several_points_cannot_be_moved_until_it_touches():
 @pytest.mark.parametrize(
     ("what", "call"),
     [
-        ("linearisation", lambda s: dap.linearize(touching(s))),
-        ("kinematics", lambda s: dap.kinematics(s, t_end=1.0)),
-        ("method standard", lambda s: dap.simulate(s, method="standard")),
+        (r"touches \(floor\) sticks or slips", lambda s: dap.linearize(touching(s))),
+        ("kinematics.*contacts", lambda s: dap.kinematics(s, t_end=1.0)),
+        ("method standard.*contacts", lambda s: dap.simulate(s, method="standard")),
     ],
 )
 def test_what_does_not_know_contacts_says_so(what, call):
-    with pytest.raises(dap.SimulationError, match=f"{what}.*contacts"):
+    with pytest.raises(dap.SimulationError, match=what):
         call(bouncing())
 
 
