@@ -16,7 +16,6 @@ from dap3d_core.integrators.moreau.contact_set import (
     velocity_of,
 )
 from dap3d_core.integrators.moreau.free_motion import largest_rate, move_freely
-from dap3d_core.integrators.moreau.groups import find_groups, root_of
 from dap3d_core.integrators.moreau.impulses import (
     complete_row,
     keep_for_reports,
@@ -25,6 +24,7 @@ from dap3d_core.integrators.moreau.impulses import (
     recall,
     remember,
 )
+from dap3d_core.integrators.moreau.matrix import find_groups, root_of
 from dap3d_core.integrators.moreau.newton import product_of, speed_of
 from dap3d_core.integrators.moreau.problem import NEAR, prepare_problem, solve
 from dap3d_core.integrators.moreau.restitution import BOUNCES, STOPS, limit_bounces
