@@ -210,7 +210,6 @@ class StepArrays(Arrays):
     y_free: Floats
     # scratch
     slopes: Floats  # (2, y) flat: dy/dt
-    changed: Floats
     slots: Integers  # table of the contacts remembered
     K: Floats
     exchanged: Integers  # rows of K
@@ -253,7 +252,6 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
         **_of_contacts(ROOM + model.contact_count),
         **scratch,
         slopes=np.zeros(2 * size),
-        changed=np.zeros(size),
         slots=np.zeros(2 * remembered + 1, dtype=np.int64),
         K=np.zeros(min(6 * n, dense_size) ** 2),
         exchanged=np.zeros(max(dense_size, 6), dtype=np.int64),

@@ -26,6 +26,7 @@ from dap3d_core.integrators.moreau.newton import (
 from dap3d_core.integrators.moreau.reduced import (
     LEAST,
     LESS,
+    factor_joints,
     is_small,
     meet_joints,
     put_felt,
@@ -44,7 +45,9 @@ MOST_SWEEPS = 2000
 #: Contacts up to which a problem is solved to rounding, whatever the tolerance.
 FEW, RESIDUAL_ROUNDING = 100, 1e-14
 #: Weights times the masses that rows feel: at first, and at most in the problem of contacts alone.
-WEIGHT, MOST_WEIGHT = 1e5, 1e7
+WEIGHT, MOST_WEIGHT = 1e5, 1e10
+#: Passes in which joints answer: what hardly moves must not be felt as if it gave.
+FELT = 2
 #: A round helps where it leaves less than this part of the residual. Rounds at most.
 HELPS, ROUNDS = 0.5, 40
 #: Part of the tolerance to which a round is solved.
@@ -140,7 +143,7 @@ def solve(s: StepArrays, tolerance: float) -> bool:
         aim = RESIDUAL_ROUNDING if few and tolerance < NEAR else tolerance
         s.residual = 1e300
         if is_small(s):
-            if not put_felt(s, 1):
+            if not factor_joints(s):
                 return False
             s.residual = newton(s, aim, True)
         if s.residual > aim:
@@ -226,8 +229,9 @@ def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
     m, best = s.contact_count, s.residual
     copy_impulses(s.x, s.y, s.kept, s.y_kept, m)
     for _ in range(HELD_ROUNDS):
-        if not put_felt(s, MET):
+        if not factor_joints(s):
             return False
+        put_felt(s, MET)
         for c in range(m):
             own = s.own_held[c]
             for r in range(3):
@@ -268,14 +272,17 @@ def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
 def newton(s: StepArrays, tolerance: float, is_reduced: bool) -> float:
     """Improve the impulses x and y of a group; the residual.
 
-    is_reduced: by the problem of contacts alone, which ``put_felt`` has made.
+    is_reduced: by the problem of contacts alone, by what ``factor_joints`` has left.
     """
     if is_reduced:
+        meet_joints(s)
         meet_joints(s)
     else:
         put_velocities(s, s.v)
     left, weight, s.factored = residual_of(s, s.v, 0.0), WEIGHT, 0.0
     most = MOST_WEIGHT if is_reduced else WEIGHT
+    if is_reduced and left > tolerance:
+        put_felt(s, FELT if tolerance < NEAR else 1)
     for _ in range(ROUNDS):
         if left <= tolerance:
             break

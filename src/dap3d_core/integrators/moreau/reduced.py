@@ -39,7 +39,7 @@ from dap3d_core.kernels.runtime.cache import compiled
 #: Weight of joints times the masses that their rows feel.
 STIFF = 1e7
 #: Passes of a round at most; to what part of the impulses they are to solve it.
-PASSES, FOUND = 10, 1e-6
+PASSES, FOUND = 10, 1e-4
 #: How weights are taken back, at most.
 LESS, LEAST = 1e-2, 1.0
 
@@ -51,11 +51,8 @@ def is_small(s: StepArrays) -> bool:
 
 
 @compiled
-def put_felt(s: StepArrays, passes: int) -> bool:
-    """Put how contacts feel each other with what joints ``answer``; False without room.
-
-    passes: by which joints are met, each to some 1e-6 of the one before.
-    """
+def factor_joints(s: StepArrays) -> bool:
+    """Put the factors of the bodies' masses with stiff joints; False without room."""
     m = s.contact_count
     if 3 * m > s.felt.shape[0]:
         s.held_count = m
@@ -66,8 +63,16 @@ def put_felt(s: StepArrays, passes: int) -> bool:
         assemble(s, STIFF, 0.0)
         factor(s)
     s.chosen_count = m
-    if not has_room:
-        return False
+    return has_room
+
+
+@compiled
+def put_felt(s: StepArrays, passes: int) -> None:
+    """Put how contacts feel each other with what joints ``answer``.
+
+    passes: by which joints are met, each to some 1e-6 of the one before.
+    """
+    m = s.contact_count
     for c in range(m):
         for r in range(3):
             column = 3 * c + r
@@ -92,7 +97,6 @@ def put_felt(s: StepArrays, passes: int) -> bool:
                 s.felt[3 * q, column] = s.felt[column, 3 * q] = u0
                 s.felt[3 * q + 1, column] = s.felt[column, 3 * q + 1] = u1
                 s.felt[3 * q + 2, column] = s.felt[column, 3 * q + 2] = u2
-    return True
 
 
 @compiled
