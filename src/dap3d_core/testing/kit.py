@@ -98,9 +98,10 @@ def check_type(type_: Any, *, poses: int = POSES, seed: int = SEED) -> Report:
     """
     type_info = type_ if isinstance(type_, TypeInfo) else examine(type_)
     outcomes = tuple(check.run() for check in _checks(type_info, poses, seed))
-    kind, keyword = type_info.type.kind, type_info.type.keyword
+    kind = "contact" if type_info.type.is_contact else type_info.type.kind
     motions = type_motions(type_info, seed=seed)
-    return Report(kind, keyword, where_is(type_info.type), seed, poses, outcomes, motions)
+    title = where_is(type_info.type)
+    return Report(kind, type_info.type.keyword, title, seed, poses, outcomes, motions)
 
 
 def type_motions(type_info: TypeInfo, *, seed: int = SEED) -> tuple[TypeMotion, ...]:

@@ -35,6 +35,10 @@ _J = (
     "body {letter}, and it should be {x.should:.6g}, the derivative of row {x.n} of C by {by} "
     "({way})"
 )
+_NORMAL = (
+    "the gap and its normal disagree by {x.error:.3g} at this pose: by {by} the gap changes at the "
+    "rate {x.should:.6g}, and by normal at the point of contact at {x.is_:.6g} ({way})"
+)
 _G = (
     "row {x.n} of G is wrong by {x.error:.3g} at this pose: it is {x.is_:.6g} and should be "
     "{x.should:.6g}, the derivative of row {x.n} of C by the unknown {name} ({way})"
@@ -90,6 +94,7 @@ def jacobian(subject: SampledType) -> CheckOutcome:
     """J is the derivative of C."""
     c = Comparison("J", subject, "J", "J against dC/dq, by complex step and by differences")
     rows = subject.type.position_rows()
+    text = _NORMAL if subject.type.is_contact else _J
     for sample in poses(subject):
         J = sample.value("J")
         for slot in range(J.shape[0]):
@@ -98,7 +103,7 @@ def jacobian(subject: SampledType) -> CheckOutcome:
                     letter = sample.kernels.type_info.layout.slots[slot]
                     by = body_words(sample, slot, column)
                     words = dict(column=column + 1, letter=letter, by=by, way=rate.way)
-                    c.compare(sample, J[slot, rows, column], rate.value, _J, words=words,
+                    c.compare(sample, J[slot, rows, column], rate.value, text, words=words,
                               tolerance=rate.tolerance, bound=rate.bound, rows=rows)  # fmt: skip
     return c.outcome()
 

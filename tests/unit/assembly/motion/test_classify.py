@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from support.internals import Pose, compose
+from support.internals import Pose, classify, compose
 from support.joint_pairs import BETWEEN, STANDARD, compiled_pair, pair
 
-from dap3d_core.assembly.motion.classify import classify
 from dap3d_core.assembly.motion.joint_motion import Part
 from dap3d_core.assembly.motion.refusals import DEPENDENT, NOT_CONSTANT, NOT_INVARIANT, ON_TIME
 from dap3d_core.simulation import CompiledModel

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from support.internals import Pose, compose, inverse, relative, rotation_vector, split
+from support.internals import Pose, classify, compose, inverse, relative, rotation_vector, split
 from support.joint_pairs import BETWEEN, STANDARD, compiled_pair, pair
 from support.rotations import to_body
 
-from dap3d_core.assembly.motion.classify import classify
 from dap3d_core.assembly.motion.coordinates import (
     aliases,
     coordinate_rates,
