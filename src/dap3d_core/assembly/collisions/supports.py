@@ -118,7 +118,7 @@ def near_support(
     total = 2 if what == CAPSULE else 2 * RIM if what == CYLINDER else 8
     if what == HULL:
         total = corners[k, 1]
-    best = -1e300
+    best, e, f = -1e300, 1.0, 0.0
     for turn in range(2):  # the farthest first, then what is nearly as far
         for c in range(total):
             p, q, s = 0.0, 0.0, 0.0
@@ -132,8 +132,9 @@ def near_support(
             else:
                 s = h[1] * (2.0 * (c & 1) - 1.0)
                 if what == CYLINDER:
-                    angle = 2.0 * math.pi / RIM * (c // 2)
-                    e, f = math.cos(angle), math.sin(angle)
+                    if c % 2 == 0:  # of both ends
+                        angle = 2.0 * math.pi / RIM * (c // 2)
+                        e, f = math.cos(angle), math.sin(angle)
                     p, q = h[0] * (a * e - b * f), h[0] * (b * e + a * f)
             far = p * x + q * y + s * z
             if turn == 0:

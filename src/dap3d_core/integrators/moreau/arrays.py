@@ -30,13 +30,16 @@ LOG_ROOM = 64
 MOST_PAIRS, MOST_POINTS, MOST_ENTRIES, MOST_HELD = 32, 8, 16, 100
 #: Part of the mass, or moment, of what a joint holds at a body below which that body is light.
 LIGHT = 1e-3
+#: Unknowns up to which the problem of contacts beside joints is solved alone.
+SMALL_SIZE = 36
 #: Kinds of contacts: with a cone; friction of a joint, or of what rolls, along rows 1 and 2; of a
 #: joint along all three.
 CONE, ALONE, WHOLE = range(3)
 #: Arrays of which a row belongs to a contact.
 OF_CONTACTS = ("bodies", "key", "kind", "under", "group", "chosen", "J", "moved", "own",
                "own_held", "gap", "mu", "rim", "e", "bias", "r", "left", "collides", "closing",
-               "x", "u", "z", "B", "B_factored", "push", "kept", "met", "x_bounce")  # fmt: skip
+               "x", "u", "z", "B", "B_factored", "push", "kept", "missing", "met",
+               "x_bounce")  # fmt: skip
 
 
 def _integer() -> Scalar[int]:
@@ -68,8 +71,8 @@ class StepArrays(Arrays):
             ("poses", "Jp", "Jp_inverse", "spin", "spin_inverse", "before", "free", "v", "delta",
              "trial", "rest", "trial_rest", "end", "J", "moved", "own", "own_held", "x", "u", "z",
              "B", "B_factored", "push",
-             "kept", "met", "D", "declared_x", "log", "values", "vectors", "crossed", "answer",
-             "felt", "bounce", "v_bounce", "x_bounce",
+             "kept", "met", "D", "declared_x", "log",
+             "felt", "answer", "missing", "bounce", "v_bounce", "x_bounce",
              "carried"),
             MATRIX,
         ),
@@ -169,6 +172,7 @@ class StepArrays(Arrays):
     B_factored: Floats  # those of K
     push: Floats
     kept: Floats
+    missing: Floats  # what they leave of the equations of a round
     u: Floats  # velocities
     met: Floats  # (c, MET) contacts that shapes push with
     # of declared contacts
@@ -207,18 +211,16 @@ class StepArrays(Arrays):
     y_free: Floats
     # scratch
     slopes: Floats  # (2, y) flat: dy/dt
-    changed: Floats
     slots: Integers  # table of the contacts remembered
     K: Floats
     exchanged: Integers  # rows of K
     change: Floats
     turned: Floats  # (36,)
     log: Floats  # (room, MET) contacts at instants reported
-    values: Floats  # (k, k), (k, k), (k, 3 c), (3 c, 3 c) of contacts that joints hold, once needed
-    vectors: Floats
-    crossed: Floats
-    answer: Floats
-    felt: Floats
+    felt: Floats  # (3 c, 3 c) how contacts feel each other with what joints answer, once needed
+    answer: Floats  # (k, 3 c) that
+    small: Floats  # the matrix of a pass of the problem of contacts alone, and its solution
+    small_step: Floats
 
 
 def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: int) -> StepArrays:
@@ -236,7 +238,9 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
     scratch: dict[str, Any] = {
         **{name: np.zeros(k) for name in (
             "s", "y", "lead", "pull", "y_kept", "y_bounce", "y_free")},
-        **{name: np.zeros((0, 0)) for name in ("values", "vectors", "crossed", "answer", "felt")},
+        **{name: np.zeros((0, 0)) for name in ("felt", "answer")},
+        "small": np.zeros(SMALL_SIZE**2 if k else 0),
+        "small_step": np.zeros(SMALL_SIZE if k else 0),
     }  # fmt: skip
     arrays = StepArrays(
         shapes=placed_shapes(model.collisions),
@@ -249,7 +253,6 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
         **_of_contacts(ROOM + model.contact_count),
         **scratch,
         slopes=np.zeros(2 * size),
-        changed=np.zeros(size),
         slots=np.zeros(2 * remembered + 1, dtype=np.int64),
         K=np.zeros(min(6 * n, dense_size) ** 2),
         exchanged=np.zeros(max(dense_size, 6), dtype=np.int64),
@@ -312,7 +315,8 @@ def _of_contacts(room: int) -> dict[str, Any]:
     """Arrays of so many contacts."""
     widths = {"bodies": 2, "J": 36, "moved": 36, "met": MET,
               **dict.fromkeys(("own", "own_held", "B", "B_factored"), 9),
-              **dict.fromkeys(("x", "u", "z", "push", "kept", "x_bounce"), 3)}  # fmt: skip
+              **dict.fromkeys(("x", "u", "z", "push", "kept", "missing", "x_bounce"),
+                              3)}  # fmt: skip
     whole = ("bodies", "key", "kind", "under", "group", "chosen", "collides")
     return {
         name: np.zeros((room, widths[name]) if name in widths else room,
@@ -413,7 +417,6 @@ def grown(s: StepArrays) -> StepArrays:
         if size > len(getattr(s, name)):
             new[name] = np.zeros(size + size // 4, dtype=np.int64)
     if s.held_count > len(s.felt) // 3:
-        k, m = len(s.y), 3 * s.held_count
-        new |= {"values": np.zeros((k, k)), "vectors": np.zeros((k, k))}
-        new |= {"crossed": np.zeros((k, m)), "answer": np.zeros((k, m)), "felt": np.zeros((m, m))}
+        m = 3 * s.held_count
+        new |= {"felt": np.zeros((m, m)), "answer": np.zeros((len(s.y), m))}
     return attrs.evolve(s, **new)

@@ -50,7 +50,8 @@ class MoreauState(IntegrationState):
 
     types: ClassVar[dict[str, Any]] = {**IntegrationState.types, "memory": MATRIX, "pushed": MATRIX}
 
-    rate = _measure()  # largest one of the forces without contacts, 1/s
+    rate = _measure()  # largest one of the forces without contacts, 1/s; by the last power alone
+    last_rate = _measure()
     largest_residual = _measure()  # of all steps, a part of the largest impulse of each
     contact_work = _measure()  # of all steps so far, J
     friction_work = _measure()  # the part of friction
@@ -63,6 +64,7 @@ class MoreauState(IntegrationState):
     memory: Floats  # (room, 5) key of a contact, or -1, its impulse, N s, and its mode
     pulls: Floats  # impulses of joints, N s, besides those of motion without contacts
     pushed: Floats  # (n + 1, 6) accelerations by contacts, global axes; 1 in the first item if any
+    direction: Floats  # a change of the state that forces change at their largest rate
     measures: Floats  # scalars
 
 
@@ -95,6 +97,7 @@ class MoreauIntegration(Integration):
             "memory": memory,
             "pulls": np.zeros(model.joint_row_count),
             "pushed": pushed,
+            "direction": np.zeros(size),
             "measures": np.zeros(len(MoreauState.indices("measures"))),
         }
 

@@ -20,26 +20,17 @@ from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import DECLARED, velocity_of
 from dap3d_core.integrators.moreau.matrix import (
     assemble,
-    factor_blocks,
-    factor_square,
+    factor,
     is_factored,
-    solve_blocks,
-    solve_square,
+    solve_factored,
 )
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
-#: Weights times the masses that rows feel: at first, and how they are taken back, at most.
-WEIGHT, LESS, LEAST = 1e5, 1e-2, 1.0
-#: A round helps where it leaves less than this part of the residual. Rounds, Newton passes of one,
-#: and halvings of a pass at most.
-HELPS, ROUNDS, PASSES, CUTS = 0.5, 40, 40, 8
-#: Part of the tolerance to which a round is solved.
-INNER = 1e-2
+#: Newton passes of a round, and halvings of a pass at most.
+PASSES, CUTS = 40, 8
 #: The best to which a round is solved.
 SOLUTION_ROUNDING = 1e-15
-#: A residual from which a round that does not help is the last.
-SETTLED = 2e-14
 TINY = 1e-300
 #: Unknowns up to which the matrix of a pass is a square; that of more has blocks.
 SMALL = 60
@@ -229,56 +220,7 @@ def residual_of(s: StepArrays, v: Floats, left: float) -> float:
     return left / (largest + TINY)
 
 
-# ------------------------------------------------------------------ rounds
-
-
-@compiled
-def newton(s: StepArrays, tolerance: float) -> float:
-    """Improve the impulses x and y of a group; the residual."""
-    put_velocities(s, s.v)
-    left, weight, s.factored = residual_of(s, s.v, 0.0), WEIGHT, 0.0
-    for _ in range(ROUNDS):
-        if left <= tolerance:
-            break
-        solve_round(s, weight, INNER * max(0.1 * tolerance, min(left, 1e-3)))
-        exchange(s)
-        new = residual_after(s)
-        helps = new <= HELPS * left
-        weight = min(weight / LESS, WEIGHT) if helps else weight * LESS
-        if new >= left:
-            exchange(s)
-            put_velocities(s, s.v)
-        left = min(left, new)
-        if weight < LEAST or (left <= SETTLED and not helps):
-            break
-    return left
-
-
-@compiled
-def residual_after(s: StepArrays) -> float:
-    """The residual of a round; where masses carried count at its own velocities.
-
-    Those of impulses have the rounding of these, which moves a link of hardly any mass far.
-    """
-    if s.carries == 0:
-        put_velocities(s, s.trial)
-        return residual_of(s, s.trial, 0.0)
-    left = 0.0
-    for q in range(s.used_count):
-        for k in range(6):
-            left = max(left, abs(s.rest[s.used[q], k]))
-    return residual_of(s, s.v, left)
-
-
-@compiled
-def exchange(s: StepArrays) -> None:
-    """Exchange the impulses x and y with those that were tried."""
-    for q in range(s.chosen_count):
-        x, push = s.x[s.chosen[q]], s.push[s.chosen[q]]
-        for k in range(3):
-            x[k], push[k] = push[k], x[k]
-    for k in range(s.y.size):
-        s.y[k], s.pull[k] = s.pull[k], s.y[k]
+# ------------------------------------------------------------------ a round
 
 
 @compiled
@@ -404,17 +346,11 @@ def try_pass(s: StepArrays, weight: float, merit: float, feels: float) -> float:
         put_slopes(s.z[c], feels * s.mu[c], s.rim[c], s.kind[c], s.B[c])
     if not is_factored(s, weight, feels):
         assemble(s, weight, feels)
-        if s.width == 6 * s.used_count:
-            factor_square(s.K, s.exchanged, s.width)
-        else:
-            factor_blocks(s.K, s.used_count, s.entry_start, s.entries, s.parent, s.turned)
+        factor(s)
     for q in range(s.used_count):
         for k in range(6):
             s.change[6 * q + k] = -s.rest[s.used[q], k]
-    if s.width == 6 * s.used_count:
-        solve_square(s.K, s.exchanged, s.change, s.width)
-    else:
-        solve_blocks(s.K, s.change, s.used_count, s.entry_start, s.entries, s.turned)
+    solve_factored(s)
     part = 1.0
     for _ in range(CUTS):
         for q in range(s.used_count):

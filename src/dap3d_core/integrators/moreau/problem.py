@@ -5,17 +5,32 @@
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators.moreau.arrays import CONE, StepArrays, step_arrays
-from dap3d_core.integrators.moreau.gauss_seidel import refine_held, sweep_bodies
-from dap3d_core.integrators.moreau.groups import choose, find_groups, lay_out
+from dap3d_core.integrators.moreau.contact_set import velocity_of
+from dap3d_core.integrators.moreau.gauss_seidel import (
+    copy_impulses,
+    sweep_bodies,
+    sweep_contacts,
+)
+from dap3d_core.integrators.moreau.matrix import choose, find_groups, lay_out
 from dap3d_core.integrators.moreau.newton import (
     SMALL,
     TINY,
     impulse_of,
     left_at,
-    newton,
     put_velocities,
+    residual_of,
     rim_of,
+    solve_round,
     times_inverse,
+)
+from dap3d_core.integrators.moreau.reduced import (
+    LEAST,
+    LESS,
+    factor_joints,
+    is_small,
+    meet_joints,
+    put_felt,
+    reduced_round,
 )
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
@@ -29,6 +44,19 @@ RELAX = 1.4
 MOST_SWEEPS = 2000
 #: Contacts up to which a problem is solved to rounding, whatever the tolerance.
 FEW, RESIDUAL_ROUNDING = 100, 1e-14
+#: Weights times the masses that rows feel: at first, and at most in the problem of contacts alone.
+WEIGHT, MOST_WEIGHT = 1e5, 1e10
+#: Passes in which joints answer: what hardly moves must not be felt as if it gave.
+FELT = 2
+#: A round helps where it leaves less than this part of the residual. Rounds at most.
+HELPS, ROUNDS = 0.5, 40
+#: Part of the tolerance to which a round is solved.
+INNER = 1e-2
+#: A residual from which a round that does not help is the last.
+SETTLED = 2e-14
+#: Of contacts held between bodies that joints guide: rounds of sweeps and Newton's method at most;
+#: passes in which joints are met; part of its own below which a contact cannot move.
+HELD_ROUNDS, MET, HELD = 3, 3, 1e-12
 #: Residual above which rows of light bodies are taken as those of what these carry.
 CARRIED = 1e-12
 
@@ -112,13 +140,19 @@ def solve(s: StepArrays, tolerance: float) -> bool:
             s.v[b, k] = s.trial[b, k] = s.free[b, k]
     choose(s, -1)
     if few or joined:
-        if not lay_out(s):
-            return False
         aim = RESIDUAL_ROUNDING if few and tolerance < NEAR else tolerance
-        s.residual = newton(s, aim)
+        s.residual = 1e300
+        if is_small(s):
+            if not factor_joints(s):
+                return False
+            s.residual = newton(s, aim, True)
+        if s.residual > aim:
+            if not lay_out(s, s.dense_size):
+                return False
+            s.residual = newton(s, aim, False)
         if s.residual > max(aim, CARRIED) and s.light_count > 0:
             take_carried(s)
-            s.residual = newton(s, aim)
+            s.residual = newton(s, aim, False)
         if few and joined and s.residual > tolerance and not refine_held(s, tolerance, aim):
             return False
     if s.carries == 0 and judge(s) > tolerance and not joined:
@@ -180,10 +214,120 @@ def refine_groups(s: StepArrays, tolerance: float) -> bool:
     for c in range(s.contact_count):
         if s.left[c] > tolerance:
             choose(s, s.group[c])
-            if not lay_out(s):
+            if not lay_out(s, s.dense_size):
                 return False
-            newton(s, tolerance)
+            newton(s, tolerance, False)
             for q in range(s.chosen_count):
                 s.left[s.chosen[q]] = 0.0
     choose(s, -1)
     return True
+
+
+@compiled
+def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
+    """Improve impulses by sweeps, then Newton's method, to a tolerance; False without room."""
+    m, best = s.contact_count, s.residual
+    copy_impulses(s.x, s.y, s.kept, s.y_kept, m)
+    for _ in range(HELD_ROUNDS):
+        if not factor_joints(s):
+            return False
+        put_felt(s, MET)
+        for c in range(m):
+            own = s.own_held[c]
+            for r in range(3):
+                for q in range(3):
+                    own[3 * r + q] = s.felt[3 * c + r, 3 * c + q]
+            felt = own[0] if s.kind[c] == CONE else own[0] + own[4] + own[8]
+            own[0] = 0.0 if felt * s.r[c] < HELD else max(own[0], TINY)
+        for _ in range(MET):
+            meet_joints(s)
+        put_velocities(s, s.v)
+        for c in range(m):
+            u = s.u[c]
+            u[0], u[1], u[2] = velocity_of(s, c, s.v)
+            u[0] += s.bias[c]
+            s.rim[c] = 0.0 if s.kind[c] == CONE else rim_of(s, c, s.x, s.y)
+        sweep_contacts(s.felt, s.own_held, s.u, s.kind, s.under, s.mu[:m], s.rim, s.x, SWEEPS,
+                       aim)  # fmt: skip
+        for _ in range(MET):
+            meet_joints(s)
+        if not lay_out(s, s.dense_size):
+            return False
+        s.residual = newton(s, aim, False)
+        if s.residual < best:
+            best = s.residual
+            copy_impulses(s.x, s.y, s.kept, s.y_kept, m)
+        else:
+            copy_impulses(s.kept, s.y_kept, s.x, s.y, m)
+            s.residual = best
+        if best <= tolerance:
+            break
+    return True
+
+
+# ------------------------------------------------------------------ rounds
+
+
+@compiled
+def newton(s: StepArrays, tolerance: float, is_reduced: bool) -> float:
+    """Improve the impulses x and y of a group; the residual.
+
+    is_reduced: by the problem of contacts alone, by what ``factor_joints`` has left.
+    """
+    if is_reduced:
+        meet_joints(s)
+        meet_joints(s)
+    else:
+        put_velocities(s, s.v)
+    left, weight, s.factored = residual_of(s, s.v, 0.0), WEIGHT, 0.0
+    most = MOST_WEIGHT if is_reduced else WEIGHT
+    if is_reduced and left > tolerance:
+        put_felt(s, FELT if tolerance < NEAR else 1)
+    for _ in range(ROUNDS):
+        if left <= tolerance:
+            break
+        inner = INNER * max(0.1 * tolerance, min(left, 1e-3))
+        if is_reduced:
+            weight = reduced_round(s, weight, inner)
+        else:
+            solve_round(s, weight, inner)
+            exchange(s)
+        new = residual_after(s, is_reduced)
+        helps = new <= HELPS * left
+        weight = min(weight / LESS, most) if helps else weight * LESS
+        if new >= left:
+            exchange(s)
+            put_velocities(s, s.v)
+        left = min(left, new)
+        if weight < LEAST or (left <= SETTLED and not helps and not is_reduced):
+            break
+    return left
+
+
+@compiled
+def residual_after(s: StepArrays, is_reduced: bool) -> float:
+    """The residual of a round; where masses carried count at its own velocities.
+
+    Those of impulses have the rounding of these, which moves a link of hardly any mass far.
+    """
+    if is_reduced:
+        return residual_of(s, s.v, 0.0)
+    if s.carries == 0:
+        put_velocities(s, s.trial)
+        return residual_of(s, s.trial, 0.0)
+    left = 0.0
+    for q in range(s.used_count):
+        for k in range(6):
+            left = max(left, abs(s.rest[s.used[q], k]))
+    return residual_of(s, s.v, left)
+
+
+@compiled
+def exchange(s: StepArrays) -> None:
+    """Exchange the impulses x and y with those that were tried."""
+    for q in range(s.chosen_count):
+        x, push = s.x[s.chosen[q]], s.push[s.chosen[q]]
+        for k in range(3):
+            x[k], push[k] = push[k], x[k]
+    for k in range(s.y.size):
+        s.y[k], s.pull[k] = s.pull[k], s.y[k]

@@ -13,7 +13,7 @@ import math
 from dap3d_core.integrators.moreau.arrays import StepArrays
 from dap3d_core.integrators.moreau.contact_set import velocity_of
 from dap3d_core.integrators.moreau.gauss_seidel import copy_impulses
-from dap3d_core.integrators.moreau.groups import find_groups, root_of
+from dap3d_core.integrators.moreau.matrix import find_groups, root_of
 from dap3d_core.integrators.moreau.problem import solve
 from dap3d_core.integrators.stepping.vector_ops import copy
 from dap3d_core.kernels.runtime.cache import compiled

@@ -16,7 +16,6 @@ from dap3d_core.integrators.moreau.contact_set import (
     velocity_of,
 )
 from dap3d_core.integrators.moreau.free_motion import follow_states, largest_rate, move_freely
-from dap3d_core.integrators.moreau.groups import find_groups, root_of
 from dap3d_core.integrators.moreau.impulses import (
     complete_row,
     keep_for_reports,
@@ -25,6 +24,7 @@ from dap3d_core.integrators.moreau.impulses import (
     recall,
     remember,
 )
+from dap3d_core.integrators.moreau.matrix import find_groups, root_of
 from dap3d_core.integrators.moreau.newton import product_of, speed_of
 from dap3d_core.integrators.moreau.problem import NEAR, prepare_problem, solve
 from dap3d_core.integrators.moreau.restitution import BOUNCES, STOPS, limit_bounces
@@ -51,9 +51,10 @@ COLLIDES = 4.0
 NOT_HIT = 2.0
 #: Parts of a step by which times differ that are meant to be one.
 SAME_TIME = 1e-9
-#: Steps between two estimates of the rate of forces. Of this over the rate are steps at most: what
-#: contacts give bodies is known to their forces in the step that follows. Parts of a step at most.
-RENEWED, FOLLOWED, MOST_STEPS = 25, 2.0, 100
+#: Steps between two passes of an estimate of the rate of forces. Of this over the rate are steps
+#: at most: what contacts give bodies is known to their forces in the step that follows. Parts of a
+#: step at most.
+RENEWED, FOLLOWED, MOST_STEPS = 3, 2.0, 100
 #: Margin of contacts, as parts of the way of a step, and m of a scene of ordinary size.
 MARGIN, LEAST_MARGIN = 1.2, 1e-6
 #: Stages of a step that waits for room: the trial state is that without contacts; it is that where

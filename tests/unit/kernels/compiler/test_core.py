@@ -127,12 +127,13 @@ NOT_CALLED = {
         ),
         "assembly.collisions.find": "has_formula touch find_touches",
         "integrators.moreau.matrix": (
-            "is_factored assemble add_load add_pressed put_turned add_contact "
-            "factor_square solve_square factor_blocks solve_blocks invert multiply take take_from"
+            "is_factored assemble add_load add_pressed put_turned add_contact factor_square "
+            "solve_square factor_blocks solve_blocks invert multiply take take_from factor "
+            "solve_factored root_of find_groups choose lay_out connect join bit_count "
+            "order_bodies degree_of eliminate block_at"
         ),
         "integrators.moreau.gauss_seidel": (
-            "sweep_bodies sweep_contacts size_of change_of refine_held copy_impulses put_crossed "
-            "put_answer put_felt"
+            "sweep_bodies sweep_contacts size_of change_of copy_impulses"
         ),
         "integrators.moreau.contact_set": (
             "find_contacts place_poses axes_of turn_tensor put_touch put_frame evaluate_rows "
@@ -140,10 +141,6 @@ NOT_CALLED = {
             "put_turning"
         ),
         "integrators.moreau.free_motion": "add_pushed move_freely normalise size_of largest_rate",
-        "integrators.moreau.groups": (
-            "root_of find_groups choose lay_out connect join bit_count order_bodies degree_of "
-            "eliminate block_at"
-        ),
         "integrators.moreau.impulses": (
             "slot_of recall put_grip let_slip remember mode_of keep_for_reports complete_row "
             "log_contacts"
@@ -151,10 +148,15 @@ NOT_CALLED = {
         "integrators.moreau.newton": (
             "put_projected slip_size put_slopes put_missed rim_of bound_of impulse_of begin_round "
             "aim_of put_velocities clear add_pull times_inverse add_inverse speed_of left_at "
-            "residual_of residual_after newton exchange put_rest product_of solve_round try_pass"
+            "residual_of put_rest product_of solve_round try_pass"
+        ),
+        "integrators.moreau.reduced": (
+            "is_small put_felt solve_bodies meet_joints reduced_round solve_reduced aim_of "
+            "put_missing try_reduced"
         ),
         "integrators.moreau.problem": (
-            "prepare_problem take_carried felt_by solve judge sweep finish refine_groups"
+            "prepare_problem take_carried felt_by solve judge sweep finish refine_groups "
+            "refine_held newton residual_after exchange"
         ),
         "integrators.moreau.restitution": (
             "limit_bounces any_gains put_work part_without_gain mix"

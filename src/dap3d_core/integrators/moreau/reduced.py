@@ -1,0 +1,267 @@
+"""The problem of contacts alone, where joints guide their bodies: a round of it.
+
+What an impulse of each contact does to the velocities of all comes from one factorisation of
+M + D^T weight s D, in which joints give hardly at all; what they give is taken back round by round.
+A round is that of newton.py with the velocities of bodies eliminated, and a pass of it a matrix of
+three unknowns a contact.
+"""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import math
+
+from dap3d_core.integrators.moreau.arrays import ALONE, CONE, StepArrays
+from dap3d_core.integrators.moreau.contact_set import velocity_of
+from dap3d_core.integrators.moreau.matrix import (
+    assemble,
+    factor,
+    factor_square,
+    lay_out,
+    solve_factored,
+    solve_square,
+)
+from dap3d_core.integrators.moreau.newton import (
+    CUTS,
+    SOLUTION_ROUNDING,
+    TINY,
+    add_pull,
+    bound_of,
+    clear,
+    put_projected,
+    put_slopes,
+    put_velocities,
+    speed_of,
+)
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.runtime.cache import compiled
+
+#: Weight of joints times the masses that their rows feel.
+STIFF = 1e7
+#: Passes of a round at most; to what part of the impulses they are to solve it.
+PASSES, FOUND = 10, 1e-4
+#: How weights are taken back, at most.
+LESS, LEAST = 1e-2, 1.0
+
+
+@compiled
+def is_small(s: StepArrays) -> bool:
+    """True where the problem of contacts alone is the cheaper one."""
+    return s.y.size > 0 and 3 * s.contact_count <= s.small_step.size
+
+
+@compiled
+def factor_joints(s: StepArrays) -> bool:
+    """Put the factors of the bodies' masses with stiff joints; False without room."""
+    m = s.contact_count
+    if 3 * m > s.felt.shape[0]:
+        s.held_count = m
+        return False
+    s.chosen_count = 0  # the matrix is of joints alone
+    has_room = lay_out(s, 0)
+    if has_room:
+        assemble(s, STIFF, 0.0)
+        factor(s)
+    s.chosen_count = m
+    return has_room
+
+
+@compiled
+def put_felt(s: StepArrays, passes: int) -> None:
+    """Put how contacts feel each other with what joints ``answer``.
+
+    passes: by which joints are met, each to some 1e-6 of the one before.
+    """
+    m = s.contact_count
+    for c in range(m):
+        for r in range(3):
+            column = 3 * c + r
+            for k in range(s.y.size):
+                s.lead[k] = s.answer[k, column] = 0.0
+            if r > 0 and s.kind[c] == CONE and s.mu[c] == 0.0 and s.x[c, r] == 0.0:
+                continue  # it never has an impulse
+            for _ in range(passes):
+                clear(s, s.delta)
+                for side in range(2):
+                    row = s.delta[s.bodies[c, side]]
+                    for k in range(6):
+                        row[k] = s.J[c, 12 * r + 6 * side + k]
+                add_pull(s, s.lead, s.delta)
+                solve_bodies(s)
+                for k in range(s.y.size):
+                    s.lead[k] -= STIFF * s.s[k] * speed_of(s, k, s.delta)
+            for k in range(s.y.size):
+                s.answer[k, column] = s.lead[k]
+            for q in range(c, m):
+                u0, u1, u2 = velocity_of(s, q, s.delta)
+                s.felt[3 * q, column] = s.felt[column, 3 * q] = u0
+                s.felt[3 * q + 1, column] = s.felt[column, 3 * q + 1] = u1
+                s.felt[3 * q + 2, column] = s.felt[column, 3 * q + 2] = u2
+
+
+@compiled
+def solve_bodies(s: StepArrays) -> None:
+    """Overwrite ``delta`` with K^-1 times it."""
+    for q in range(s.used_count):
+        for k in range(6):
+            s.change[6 * q + k] = s.delta[s.used[q], k]
+    solve_factored(s)
+    for k in range(6):
+        s.delta[0, k] = 0.0
+    for q in range(s.used_count):
+        for k in range(6):
+            s.delta[s.used[q], k] = s.change[6 * q + k]
+
+
+@compiled
+def meet_joints(s: StepArrays) -> None:
+    """Improve the impulses y of joints, given those of contacts, and put velocities with both."""
+    put_velocities(s, s.v)
+    left = largest = 0.0
+    for k in range(s.y.size):
+        missed = s.s[k] * (speed_of(s, k, s.v) - speed_of(s, k, s.free))
+        left, largest = max(left, abs(missed)), max(largest, abs(s.y[k]))
+        s.lead[k] = -STIFF * missed
+    if left <= SOLUTION_ROUNDING * largest:  # it would be of rounding alone
+        return
+    clear(s, s.delta)
+    add_pull(s, s.lead, s.delta)
+    solve_bodies(s)
+    for k in range(s.y.size):
+        s.y[k] += s.lead[k] - STIFF * s.s[k] * speed_of(s, k, s.delta)
+    for q in range(s.used_count):
+        for k in range(6):
+            s.v[s.used[q], k] += s.delta[s.used[q], k]
+
+
+@compiled
+def reduced_round(s: StepArrays, weight: float, tolerance: float) -> float:
+    """Bring x and y to the end of a round; those of before are in ``push`` and ``pull``.
+
+    Returns the weight, less than asked for where no pass was found with that.
+    """
+    m = s.contact_count
+    for c in range(m):
+        u = s.u[c]
+        u[0], u[1], u[2] = velocity_of(s, c, s.v)
+        u[0] += s.bias[c]
+    while not solve_reduced(s, weight, tolerance) and weight >= LEAST:
+        weight *= LESS
+    for k in range(s.y.size):
+        s.pull[k] = s.y[k]
+        for c in range(m):
+            for r in range(3):
+                s.y[k] += s.answer[k, 3 * c + r] * s.push[c, r]
+    for c in range(m):
+        for k in range(3):
+            old = s.x[c, k]
+            s.x[c, k], s.push[c, k] = old + s.push[c, k], old
+    meet_joints(s)
+    return weight
+
+
+@compiled
+def solve_reduced(s: StepArrays, weight: float, tolerance: float) -> bool:
+    """Find what impulses change by in a round, ``push``, by Newton's method; True if found.
+
+    Weights multiply the rounding of what impulses change by, and not that of impulses.
+    """
+    is_far = False
+    for c in range(s.contact_count):
+        s.push[c, 0] = s.push[c, 1] = s.push[c, 2] = 0.0
+    merit = put_missing(s, s.push, weight)
+    for _ in range(PASSES):
+        if merit <= aim_of(s, tolerance):
+            break
+        better = try_reduced(s, weight, merit, 1.0)
+        if better < 0.0:
+            put_missing(s, s.push, weight)
+            better = try_reduced(s, weight, merit, 0.0)
+        if better < 0.0 and is_far:
+            break
+        if better < 0.0:
+            is_far = True
+            for c in range(s.contact_count):
+                for k in range(3):
+                    s.push[c, k] = -s.x[c, k]
+            better = put_missing(s, s.push, weight)
+        merit = better
+    return merit <= aim_of(s, FOUND)
+
+
+@compiled
+def aim_of(s: StepArrays, tolerance: float) -> float:
+    """The merit at which a round is solved."""
+    size = TINY
+    for c in range(s.contact_count):
+        for k in range(3):
+            x = s.x[c, k] + s.push[c, k]
+            size += x * x / s.r[c]
+    return max(tolerance, SOLUTION_ROUNDING) ** 2 * size
+
+
+@compiled
+def put_missing(s: StepArrays, change: Floats, weight: float) -> float:
+    """Put what changes of impulses leave of the equations of a round, ``missing``; its square.
+
+    They are x + change = P(x - weight r (u + W change)).
+    """
+    m, total = s.contact_count, 0.0
+    for c in range(m):
+        z, x, missing, part = s.z[c], s.x[c], s.missing[c], weight * s.r[c]
+        for r in range(3):
+            row, u = s.felt[3 * c + r], s.u[c, r]
+            for q in range(m):
+                d = change[q]
+                u += row[3 * q] * d[0] + row[3 * q + 1] * d[1] + row[3 * q + 2] * d[2]
+            z[r] = x[r] - part * u
+        s.rim[c] = bound_of(s, c, s.z, s.y)
+        put_projected(z, s.rim[c], s.kind[c], missing)
+        for r in range(3):
+            missing[r] = change[c, r] - (missing[r] - x[r])
+            total += missing[r] * missing[r] / s.r[c]
+    return total
+
+
+@compiled
+def try_reduced(s: StepArrays, weight: float, merit: float, feels: float) -> float:
+    """Take a Newton step, or a part of it; the new merit, -1 if none is better.
+
+    feels: as of ``try_pass``.
+    """
+    m, n, K, step = s.contact_count, 3 * s.contact_count, s.small, s.small_step
+    for c in range(m):
+        B, z, part = s.B[c], s.z[c], weight * s.r[c]
+        put_slopes(z, feels * s.mu[c], s.rim[c], s.kind[c], B)
+        for r in range(3):
+            at, row = n * (3 * c + r), s.felt
+            for k in range(n):
+                K[at + k] = part * (
+                    B[3 * r] * row[3 * c, k]
+                    + B[3 * r + 1] * row[3 * c + 1, k]
+                    + B[3 * r + 2] * row[3 * c + 2, k]
+                )
+            K[at + 3 * c + r] += 1.0
+            step[3 * c + r] = -s.missing[c, r]
+        size = math.sqrt(z[1] * z[1] + z[2] * z[2])
+        if s.kind[c] == ALONE and s.under[c] >= 0 and feels > 0.0 and 0.0 < s.rim[c] < size:
+            u = s.under[c]
+            for r in range(1, 3):  # what resists rolling grows with what presses
+                along = weight * s.r[u] * z[r] / size
+                for k in range(n):
+                    K[n * (3 * c + r) + k] += along * s.felt[3 * u, k]
+    factor_square(K, s.exchanged, n)
+    solve_square(K, s.exchanged, step, n)
+    part = 1.0
+    for _ in range(CUTS):
+        for c in range(m):
+            for k in range(3):
+                s.kept[c, k] = s.push[c, k] + part * step[3 * c + k]
+        found = put_missing(s, s.kept, weight)
+        if found < (1.0 - 0.1 * part) * merit:
+            for c in range(m):
+                for k in range(3):
+                    s.push[c, k] = s.kept[c, k]
+            return found
+        part *= 0.5
+    return -1.0
