@@ -9,7 +9,7 @@ from dap3d_core.assembly.motion.classify import classify
 from dap3d_core.assembly.motion.joint_motion import Part
 from dap3d_core.assembly.motion.refusals import DEPENDENT, NOT_CONSTANT, NOT_INVARIANT, ON_TIME
 from dap3d_core.simulation import CompiledModel
-from dap3d_core.testing.checks.motion import axis_words, motion_words
+from dap3d_core.testing.checks.joints import axis_words, motion_words
 
 #: C of lengths of 1 m to 3 m: some hundred operations of relative error 1e-16.
 ROUNDING = 1e-13
