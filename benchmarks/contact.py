@@ -12,7 +12,7 @@ from verification.test_contacts import TIGHT, G, ball, slope, spring_block, time
 
 import dap3d_core as dap
 from dap3d_core.formulations import RHS
-from dap3d_core.formulations.contacts.contact_rows import ContactTable
+from dap3d_core.formulations.contacts.contact_table import ContactTable
 from dap3d_core.formulations.programs.scene_program import load_programs, write_programs
 from dap3d_core.kernels.compiler.objects import optimised
 from dap3d_core.simulation import CompiledModel

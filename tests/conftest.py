@@ -4,6 +4,7 @@ import gc
 import os
 import signal
 from collections import defaultdict
+from zlib import crc32
 
 import pytest
 from support.process import UNOPTIMISED
@@ -27,7 +28,7 @@ def pytest_collection(session):
 def keep_unoptimised():
     """Let code stay unoptimised, which has the same bits, and keep it: most tests have ended before
     optimised code is there, which takes longer to make than all of them. Where the user's cache has
-    some, it is used. The optimised code of each function is tested in unit/kernels/compiler."""
+    some, it is used. Optimised code is tested in unit/kernels/compiler."""
     from dap3d_core.kernels.compiler import background, objects, units
     from dap3d_core.kernels.runtime.cache import cache_folder
 
@@ -59,7 +60,8 @@ def keep_unoptimised():
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
     """Of the cases of a verification the quick tests take the first, of `every(n)` each n-th, of
-    any other test that has more than five each third."""
+    any other test that has more than five each third. Of those that they leave CI verifies all, of
+    `thinned(n)` one of n, without order: each n-th would have the same value of some parameter."""
     cases = defaultdict(list)
     for item in items:
         if not item.get_closest_marker("slow"):
@@ -75,6 +77,10 @@ def pytest_collection_modifyitems(items):
         for k, item in enumerate(found):
             if k % n:
                 item.add_marker("slow")
+    for item in items:
+        thinned, slow = map(item.get_closest_marker, ("thinned", "slow"))
+        if thinned and slow and crc32(item.nodeid.encode()) % thinned.args[0]:
+            item.add_marker("long")
 
 
 def pytest_collection_finish():

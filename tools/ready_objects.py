@@ -1,10 +1,10 @@
 """Ready-made objects of a wheel: units that most scenes need, compiled for every target.
 
-``python tools/ready_objects.py FOLDER [TARGET ...]`` writes a file for each target; its code is
-unoptimised where DAP3D_READY_LEVEL is 0: a minute less, for tests. It compiles the source tree that
-contains it, installed or not; it needs attrs, llvmlite, numpy, pluggy and scipy. The loops are
-those of all standard types; the core's units are those that runs of the shipped models make, with
-each method and integrator.
+``python tools/ready_objects.py FOLDER [TARGET ...]`` writes a file for each target. It compiles the
+source tree that contains it, installed or not; it needs attrs, llvmlite, numpy, pluggy and scipy.
+The loops are those of all standard types; the core's units are those that runs of the shipped
+models make, with each method and integrator. Where DAP3D_READY_LEVEL is 0, for tests, code is
+unoptimised and of three models alone: more than a minute less.
 """
 
 import concurrent.futures
@@ -23,6 +23,9 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 #: External symbols that objects may have besides the C library's: those that LLVM calls.
 SYSTEM = {"memcpy", "memmove", "memset", "bzero", "__bzero", "memset_pattern16", "__chkstk"}
 SYSTEM.add("_fltused")  # a marker of Windows, no function
+MODELS = sorted(path.parent for path in (ROOT / "models").glob("*/scene.toml"))
+#: The name of the level of optimisation, and the models that tests run.
+LEVEL, TRIED = "DAP3D_READY_LEVEL", ("bodies2", "fourbar3", "pen2")
 
 
 def main(arguments: list[str]) -> None:
@@ -66,7 +69,7 @@ def pack_of(target_name: str, units: dict[str, Any]) -> tuple[bytes, int]:
 
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
-    level = int(os.environ.get("DAP3D_READY_LEVEL", OPTIMISED))
+    level = int(os.environ.get(LEVEL, OPTIMISED))
     kept = {}
     for name, (text, results) in units.items():
         code = compile_ir(text, level, TARGETS[target_name])
@@ -90,7 +93,8 @@ def gathered() -> dict[str, Any]:
     for kind in GROUPS:
         for keyword in PROJECT["entry-points"][f"dap3d.{kind}s"]:
             compile_all(registry.get(kind, keyword))
-    for folder in sorted(path.parent for path in (ROOT / "models").glob("*/scene.toml")):
+    is_tried = os.environ.get(LEVEL) == "0"
+    for folder in (path for path in MODELS if path.name in TRIED or not is_tried):
         scene = dap.load(folder)
         for integrator in INTEGRATORS:
             for method in METHODS:
@@ -112,7 +116,7 @@ def _gathered_alone(scratch: Path) -> dict[str, Any]:
     The process extends its path itself: where pip builds in isolation, it removes the folders of
     packages that are installed editable from the path, even if PYTHONPATH names them.
     """
-    env = {k: v for k, v in os.environ.items() if not k.startswith("DAP3D_")}
+    env = {k: v for k, v in os.environ.items() if not k.startswith("DAP3D_") or k == LEVEL}
     env["DAP3D_CACHE_DIR"] = str(scratch / "cache")
     command = [sys.executable, __file__, "--gather", str(scratch)]
     done = subprocess.run(command, env=env, check=False, stdout=subprocess.PIPE)

@@ -12,6 +12,8 @@ from dap3d_core.interface.formats import FormatError, Remarks, XmlElement
 
 TAKEN, TRANSLATED, NOTED, REFUSED = "taken", "translated", "noted", "refused"
 MOVES = "noted, changes the motion"
+#: The remark of an import without contacts, of shapes that touch others in the file.
+NO_CONTACTS = "shapes that collide pass through each other; --contacts has them touch"
 
 Word = tuple[str, str]
 Table = Mapping[str, Mapping[str, Word]]

@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-from support.internals import Evaluator, call_kinds, join, specs_of, split
+from support.internals import FRICTION, Evaluator, call_kinds, join, specs_of, split
 from support.motions import Motion
 from support.rotations import rotation
 from support.scenes import case_names, cases, scene_for
 
 import dap3d_core as dap
-from dap3d_core.assembly.arrays import FRICTION
 from dap3d_core.model import build_model
 from dap3d_core.scene import check as checked
 from dap3d_core.simulation.linearization.tangent import tangent_matrices

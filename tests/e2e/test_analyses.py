@@ -42,7 +42,7 @@ def test_a_dead_point_saves_what_was_found_before(dap3d):
     del scene.joints["motor"]
     scene.add_joint("drive-tran", "ram", P_i="slider.O", P_j="guide", a_j="ground.x",
                     function="turning")  # fmt: skip
-    scene.save(dap3d.folder / "press.toml")
+    scene.save(dap3d.folder / "press.toml", force=True)
     done = dap3d("kinematics", "press.toml", "--over", "ram.q=0:1:101", "-o", "a.nc")
     assert done.returncode == 3
     assert "dead point at ram.q = 0.0" in " ".join(done.stderr.split())

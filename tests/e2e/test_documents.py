@@ -180,7 +180,7 @@ def takes_long(page):
         for page in FOLLOWED
     ],
 )
-def test_the_steps_of_a_page(page, tmp_path, monkeypatch):
+def test_the_steps_of_a_page(page, tmp_path, monkeypatch, quick_libraries):
     """Files, scripts and commands of a page, in their order; scripts hold assertions."""
     monkeypatch.setenv("MPLBACKEND", "Agg")
     monkeypatch.setattr(sys, "path", [*sys.path])

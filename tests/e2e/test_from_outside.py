@@ -9,12 +9,10 @@ import zipfile
 from math import exp, sin
 
 import pytest
+from support.internals import objects, ready
 from support.outside import Outside, build, isolated, pip
 from support.pages import steps, write
 from support.process import REPOSITORY, run
-
-from dap3d_core.kernels.compiler import objects
-from dap3d_core.kernels.runtime import ready
 
 pytestmark = pytest.mark.slow
 TARGET = ready.target_of(objects.processor().triple, objects.host_features())

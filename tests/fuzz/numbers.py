@@ -15,11 +15,10 @@ from pathlib import Path
 import numpy as np
 from hypothesis import strategies as st
 from support.ended import EndedError
-from support.internals import Checkpoint, read_checkpoint, write_checkpoint
+from support.internals import Checkpoint, read_checkpoint, write_checkpoint, write_checksums
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError
-from dap3d_core.result.file.checksum import write_checksums
 from fuzz.acceptable import examine_result, strict
 from fuzz.damage import seeds
 from fuzz.results import HANG, SEAL, in_child

@@ -42,9 +42,9 @@ def test_more_inputs(name):
 
 
 @pytest.mark.every(4)
-@pytest.mark.parametrize("number", [1_000_014, 1357, 1477, 2021])
+@pytest.mark.parametrize("number", [1_000_014, 1357, 1477, 2021, 2184, 1_000_076, 1_048_577])
 def test_contacts_that_once_ended_falsely(number):
-    """As "ever faster", by steps as short as rounding, or with a force that pulls."""
+    """As "ever faster", by steps as short as rounding, with a force that pulls, or overlapping."""
     assert check_contacts(str(number).encode()) == "done"
 
 

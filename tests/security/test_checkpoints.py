@@ -9,13 +9,18 @@ import pytest
 from fuzz.numbers import PATIENCE, RUNS, check_change, folder, make
 from fuzz.results import in_child
 from support.ended import EndedError, ended_at, leave, shorten_chunks
-from support.internals import Checkpoint, RadauState, read_checkpoint, write_checkpoint
+from support.internals import (
+    Checkpoint,
+    IntegrationState,
+    RadauState,
+    read_checkpoint,
+    write_checkpoint,
+)
 from support.results import same_bits
 
 import dap3d_core as dap
 from dap3d_core.cli import main
 from dap3d_core.integrators.adams.formulas import AdamsState
-from dap3d_core.integrators.stepping.integration_state import IntegrationState
 from dap3d_core.simulation import CheckpointError, CompiledModel
 
 

@@ -5,9 +5,8 @@ from functools import cache
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import System, step_functions
 from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
-from support.internals import DTYPES, Array, compiled, loop_list
+from support.internals import DTYPES, Array, System, compiled, loop_list, step_functions
 
 # The system is an empty one of the core, whose integrators are compiled for it already; its
 # ``force`` counts the calls of rhs, project and report.

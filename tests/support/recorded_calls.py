@@ -13,7 +13,6 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.kernels.compiler.derivatives import differentiate
 from dap3d_core.kernels.runtime import cache
 from dap3d_core.kernels.runtime.lanes import Differentiation
 from dap3d_core.kernels.runtime.source_digest import COMPILED_LAYERS
@@ -38,6 +37,7 @@ from support.internals import (
     Tuple,
     address_of,
     array_members,
+    differentiate,
     pointer,
     trace,
     type_of,

@@ -3,8 +3,7 @@
 import numpy as np
 
 import dap3d_core as dap
-from dap3d_core.testing.samples.sampled_type import own_values
-from support.internals import slot_of, specs_of
+from support.internals import own_values, slot_of, specs_of
 from support.rotations import rotation
 
 

@@ -97,6 +97,27 @@ def test_bounces_below_the_rounding_of_a_step_are_not_missed(e, g, radius):
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.parametrize("part", [0.1, 0.3])
+@pytest.mark.parametrize(("push", "rise"), [(0.01, 1.0), (0.1, 30.0)])
+def test_a_dip_within_the_step_that_leaves_a_contact_is_an_impact(integrator, part, push, rise):
+    """z = v t - push t^2 / 2 + rise t^3 / 6: it leaves, dips for a hundredth of a step, and rises.
+
+    Rounding of lengths, 1e-14 m, over its speed bounds the instant.
+    """
+    v = part * 3.0 * push**2 / (8.0 * rise)
+    scene = dap.Scene(name="dip")
+    scene.add_body("point", mass=1.0, Jp=[0.01] * 3, r_dot=[0.0, 0.0, v])
+    scene.add_function("a", "f", coeff=[-push, rise, 0.0])
+    scene.add_force("f", "pull", body_i="point", f=[0.0, 0.0, 1.0], function="f")
+    scene.add_contact("ball_plane", "floor", P_i="point.O", e=0.5)
+    result = dap.simulate(scene, t_end=5.0 * push / rise, dt=push / rise / 100.0,
+                          integrator=integrator, contact="events")  # fmt: skip
+    first = min(np.roots([rise / 6.0, -push / 2.0, v]))
+    assert times(result, "impact")[0] == pytest.approx(first, abs=1e-14 / v)
+    assert result.contact("floor").gap.min() > -1e-12
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_a_ball_slides_then_rolls_with_five_sevenths_of_its_speed(integrator):
     v, mu = 3.0, 0.3
     result = dap.simulate(ball(v=v, mu=mu), t_end=2.0, dt=0.1, integrator=integrator, **TIGHT)

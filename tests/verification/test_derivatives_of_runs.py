@@ -61,6 +61,61 @@ def test_an_oscillator(integrator):
     assert s.names == tuple(by)
 
 
+@pytest.mark.parametrize("keyword", ["cable", "tendon"])
+def test_by_a_point_in_a_list(keyword):
+    """Where a spring of points ends: x = q + oscillation(x_0 - q), as sweeps have it, too. Such a
+    point was taken for one that nothing reads: derivatives were zero, and sweeps of one value."""
+    scene = oscillator()
+    scene.forces.clear()
+    scene.add_point("end", "ground", (0.0, 0.0, 0.0))
+    scene.add_force(keyword, "spring", points=["mass.O", "end"], k=40.0, length=1.0, c=0.8)
+    values = (2.0, 40.0, 0.8, 1.0)
+
+    def motion(t, q):
+        return q + oscillation(t, *values, 1.5 - q, 0.2)
+
+    s = dap.sensitivities(scene, ["points.end.sPp.x"], t_end=0.5, dt=0.05, **TIGHT)
+    close(s.of("mass.r.x")[:, 0], derivative(lambda q: motion(s.result.t, q), 0.0))
+    swept = dap.sweep(scene, {"points.end.sPp.x": [0.0, 0.1]}, outputs=["mass.r.x"], t_end=0.5,
+                      dt=0.05, **TIGHT)  # fmt: skip
+    expected = [motion(0.5, 0.0), motion(0.5, 0.1)]
+    assert next(iter(swept.data_vars.values())).values == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("aside", ["x", "y"])
+def test_by_the_direction_of_an_axis_along_another(aside):
+    """A body falls down a rail along z: -a (a . g) t^2 / 2 along its axis a, by what tilts it. The
+    normals that complete an axis jumped where two components of it are equal, as zeros are."""
+    scene = dap.Scene(name="rail")
+    scene.add_body("block", mass=2.0, Jp=(1.0, 1.0, 1.0))
+    scene.add_vector("rail", "ground", (0.0, 0.0, 1.0))
+    scene.add_joint("tran", "guide", P_i="block.O", P_j="ground.O", a_j="rail")
+    scene.add_force("weight", "gravity", gravity=9.81)
+    s = dap.sensitivities(scene, [f"vectors.rail.sp.{aside}"], t_end=1.0, dt=0.1, **TIGHT)
+    fallen = -0.5 * 9.81 * s.result.t**2
+    expected = np.zeros((len(fallen), 3))
+    expected[:, "xyz".index(aside)] = fallen
+    assert s.of("block.r")[..., 0] == pytest.approx(expected, abs=1e-9)
+
+
+def test_by_the_direction_of_an_axis_whose_normals_jump():
+    """Where one component of an axis is above the least by a fiftieth, its normals are others on
+    either side: the derivative is taken on one."""
+    sp = np.array([0.32, np.sqrt(1.0 - 0.32**2 - 0.3**2), 0.3])
+    scene = dap.Scene(name="rail")
+    scene.add_body("block", mass=2.0, Jp=(1.0, 1.0, 1.0))
+    scene.add_vector("rail", "ground", tuple(sp.tolist()))
+    scene.add_joint("tran", "guide", P_i="block.O", P_j="ground.O", a_j="rail")
+    scene.add_force("weight", "gravity", gravity=9.81)
+    s = dap.sensitivities(scene, ["vectors.rail.sp.x"], t_end=1.0, dt=0.1, **TIGHT)
+
+    def place(x):
+        a = np.array([x, sp[1], sp[2]])
+        return -0.5 * 9.81 * s.result.t[:, None] ** 2 * a[2] * a / (a @ a)
+
+    assert s.of("block.r")[..., 0] == pytest.approx(derivative(place, 0.32), abs=1e-9)
+
+
 def pendulum(length=0.7):
     """A weight on a rod of this length, released from 2 rad: all by one parameter."""
     scene = dap.Scene(name="pendulum")

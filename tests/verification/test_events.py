@@ -6,11 +6,11 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from support.contact import contact_registry
+from support.internals import LOGGED
 
 import dap3d_core as dap
 from dap3d_core.formulations.switches import effects_of
 from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
-from dap3d_core.integrators.stepping.integration_state import LOGGED
 
 TIGHT = {"rtol": 1e-12, "atol": 1e-14}
 G = 9.81

@@ -15,7 +15,7 @@ pytestmark = [
     pytest.mark.skipif(not any(map(shutil.which, ("cc", "gcc"))), reason="there is no C compiler"),
 ]
 INTEGRATORS = ["dop853", "dopri5", "rk4", "adams", "radau", "auto"]
-#: A model with a type of its own, and a group: events of contacts are not exported, steps below.
+#: A model with a type of its own, and a group that is tested below.
 WITHOUT = {"ball1", "contact"}
 MODELS = sorted(
     name for name, at in dap.shipped_models().items() if WITHOUT.isdisjoint({name, at.parent.name})
@@ -46,8 +46,8 @@ def test_a_shipped_model_has_the_bits_of_simulate(tmp_path, request, model, inte
     assert differences(scene, tmp_path, t_end, integrator=integrator, step=step)
 
 
-@pytest.mark.parametrize("model", ["domino_row", "gripper", "marble_run", "quadruped"])
+@pytest.mark.parametrize("model", ["cradle", "domino_row", "gripper", "marble_run", "quadruped"])
 def test_a_shipped_model_of_contacts_has_the_bits_of_simulate(tmp_path, quick_libraries, model):
-    """By steps of contacts, which these models take."""
+    """By steps of contacts, or by events (the cradle), as these models take them."""
     scene = dap.load(model)
     assert differences(scene, tmp_path, float(scene.simulation.t_end))

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from support import problems
+from support.internals import RadauIntegration
 from support.process import REPOSITORY
 
 import dap3d_core as dap
 from dap3d_core.integrators import Status
-from dap3d_core.integrators.radau.integration import RadauIntegration
 
 sys.path.append(str(REPOSITORY / "benchmarks"))
 

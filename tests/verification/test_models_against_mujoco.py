@@ -5,11 +5,11 @@
 
 import numpy as np
 import pytest
+from support.internals import rotation
 from support.mujoco_models import Oracle
 from support.process import REPOSITORY
 
 import dap3d_core as dap
-from dap3d_core.model.rotations import rotation
 
 pytest.importorskip("mujoco")
 DATA = REPOSITORY / "tests" / "data" / "formats"

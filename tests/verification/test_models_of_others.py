@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from support.internals import rotation
 from support.process import REPOSITORY
 
 import dap3d_core as dap
 from dap3d_core.formats.import_scene.scene_of_model import STOP_TIME
-from dap3d_core.model.rotations import rotation
 
 
 def imported(tmp_path, text, suffix, **options):

@@ -1,4 +1,5 @@
 """Programs of scenes: every shipped model, formulation and integrator has the bits of general code.
+Outside releases a model and a formulation have one integrator, by turns.
 Elements with unknowns, states, friction and tables among them, as far as the scenes of the example
 package have them. Rows are compared as numbers: 0.0 equals -0.0. Programs are optimised in the long
 verification, and in unit/formulations/programs."""
@@ -7,13 +8,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.internals import change_over, objects, scene_program
 from support.plain import jit_is_on
 from support.process import REPOSITORY
 
 import dap3d_core as dap
 from dap3d_core.formulations import FORMULATIONS
-from dap3d_core.formulations.programs import change_over, scene_program
-from dap3d_core.kernels.compiler import objects
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")]
 #: Scenes with contacts have other loops of steps.
@@ -36,10 +36,15 @@ def unoptimised(text, results, path):
     return objects.compile_ir(text, objects.UNOPTIMISED)
 
 
-@pytest.fixture(autouse=True)
-def at_once(monkeypatch, request):
+#: Each model is of a kind of its own, but for those of engineers, whose elements others have too,
+#: and the row of forty loops: they are run for releases, by optimised programs.
+LONG = [path for path in MODELS if {"engineering", "A02-40"} & {path.parent.name, path.name}]
+
+
+@pytest.fixture
+def at_once(monkeypatch, model):
     """Programs are made at the first call, in this process."""
-    if not request.node.get_closest_marker("long"):
+    if model not in LONG:
         monkeypatch.setattr(scene_program, "path_of", lambda name: None)
         monkeypatch.setattr(change_over, "objects", SimpleNamespace(optimised=unoptimised))
     monkeypatch.setattr(change_over, "MAKE_AFTER", 0.0)
@@ -49,27 +54,24 @@ def at_once(monkeypatch, request):
     return monkeypatch
 
 
-#: Each model is of a kind of its own, but for those of engineers, whose elements others have too,
-#: and the row of forty loops.
-LONG = {"engineering", "A02-40"}
 RUN = [
-    pytest.param(
-        path,
-        id=path.stem + path.parent.name,
-        marks=[pytest.mark.long] if LONG & {path.parent.name, path.name} else [],
-    )
-    for path in MODELS
-]
+    *(pytest.param(path, False, id=path.stem + path.parent.name)
+      for path in MODELS if path not in LONG),
+    *(pytest.param(path, True, id=f"{path.stem}{path.parent.name}-all", marks=pytest.mark.long)
+      for path in MODELS),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize("model", RUN)
-def test_bits_are_those_of_general_code(model, at_once):
-    """With each formulation and integrator that takes the scene."""
+@pytest.mark.parametrize(("model", "with_all"), RUN)
+def test_bits_are_those_of_general_code(model, with_all, at_once):
+    """With each formulation, and each integrator or the first by turns that takes the scene."""
     scene, ran = dap.load(model), 0
     end = min(scene.simulation.t_end, 0.3)
-    for method in FORMULATIONS:
-        for integrator, settings in INTEGRATORS.items():
-            settings = settings | {"method": method, "integrator": integrator, "allow_code": True}
+    for turn, method in enumerate(FORMULATIONS, MODELS.index(model)):
+        for k in range(len(INTEGRATORS)):
+            integrator = list(INTEGRATORS)[(turn + k) % len(INTEGRATORS)]
+            settings = INTEGRATORS[integrator] | {"method": method, "integrator": integrator}
+            settings["allow_code"] = True
             at_once.setattr(change_over, "LOAD_AFTER", np.inf)
             try:
                 general = dap.simulate(scene, t_end=end, dt=end / 5, **settings)
@@ -81,7 +83,9 @@ def test_bits_are_those_of_general_code(model, at_once):
                 one, other = getattr(general, name), getattr(result, name)
                 assert np.array_equal(one, other, equal_nan=True), (method, integrator, name)
             ran += 1
-    assert ran > 3
+            if not with_all:
+                break
+    assert ran > (3 if with_all else 0)
     reasons = {record.reason for record in change_over._records.values()} - {""}
     known = model.stem in BRANCHING or model.name in BRANCHING or "A02-40" in str(model)
     assert known or not reasons, reasons

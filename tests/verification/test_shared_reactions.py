@@ -107,7 +107,7 @@ def test_check_says_it(tmp_path, capsys):
     """Exit code 2, as for a scene that no run can take; with "least" it names the readers."""
     path = tmp_path / "door.toml"
     for shared, code in ({}, 2), ({"shared": "least"}, 0):
-        door(**shared).save(path)
+        door(**shared).save(path, force=True)
         assert main(["check", str(path)]) == code
         assert "read by f0, f1" in capsys.readouterr().out
 

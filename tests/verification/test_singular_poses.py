@@ -3,6 +3,8 @@ The reference of A02 is its one closed equation, solved to 1e-12; the error e is
 benchmarks.md, section 0. Between rtol 1e-8 and the end lie ten crossings or so of the pose with all
 links in line, and ten seconds that multiply an error by about 100."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from support import problems, redundant
@@ -47,8 +49,14 @@ def test_four_bars_at_the_default_tolerances(count):
     assert all(result.ledger["position"].ok for result in results)
 
 
-@pytest.mark.parametrize("integrator", ["dop853", "dopri5"])
-@pytest.mark.parametrize("count", [1, 2, pytest.param(40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("count", "integrator"),
+    [
+        *product((1, 2), ("dop853", "dopri5")),
+        pytest.param(40, "dop853", marks=pytest.mark.slow),
+        pytest.param(40, "dopri5", marks=[pytest.mark.slow, pytest.mark.long]),
+    ],
+)
 def test_four_bars_through_every_crossing(count, integrator):
     """rtol 1e-10: e < 1e-6 over a thousand instants, interpolated ones and some beside the singular
     pose among them; the energy holds to 1e-8 of what is exchanged."""

@@ -80,3 +80,34 @@ def test_of_longer_paths_it_is_left_out(tmp_path):
     path = tmp_path / "a.xml"
     path.write_text(MODEL.format(equality='tendon1="t" tendon2="l"'))
     assert any("equality of tendons" in one.text for one in dap.import_model(path)[1].left_out)
+
+
+@pytest.mark.parametrize("wheels", [3, 6])
+def test_a_row_of_light_wheels_carries_all(wheels):
+    """Of two slides, coupled by wheels of 1e-9 kg m^2, that of 3 kg presses with its 2 kg more.
+
+    To 1e-10: a residual of 1e-12 ends the method, counted by masses of light wheels or what they
+    carry.
+    """
+    scene = dap.Scene(name="balance")
+    for name, x, mass in (("a", 0.0, 1.0), ("b", 1.0, 3.0)):
+        scene.add_body(name, mass=mass, Jp=[0.01] * 3, r=[x, 0.0, 0.1])
+        scene.add_point(f"foot_{name}", body="ground", sPp=[x, 0.0, 0.0])
+        scene.add_joint("tran", f"slide_{name}", P_i=f"{name}.O", P_j=f"foot_{name}",
+                        a_j="ground.z")  # fmt: skip
+        scene.add_shape("sphere", body=name, radius=0.1, collides=True)
+    scene.add_shape("plane", body="ground", collides=True)
+    before, z = "ground", {"a_j": "ground.z"}
+    for k in range(wheels):
+        scene.add_body(f"w{k}", mass=1e-9, Jp=[1e-9] * 3)
+        scene.add_joint("rev", f"bearing{k}", P_i=f"w{k}.O", P_j="ground.O", a_i=f"w{k}.z",
+                        **z)  # fmt: skip
+        if k:
+            scene.add_joint("follow", f"row{k}", body_i=f"w{k}", a_k=f"{before}.z", **z)
+        before = f"w{k}"
+    scene.add_joint("follow", "first", body_i="a", a_k="w0.z", along=True, **z)
+    scene.add_joint("follow", "last", body_i="b", a_k=f"{before}.z", ratio=-1.0, along=True, **z)
+    scene.add_force("weight", "gravity")
+    result = dap.simulate(scene, t_end=1e-3, dt=1e-3, contact_step=1e-3, contact="stepping")
+    np.testing.assert_allclose(result.rd[-1, :2], 0.0, atol=1e-12)
+    np.testing.assert_allclose(result.contacts.force[-1, 2], 2.0 * 9.81, rtol=1e-10)

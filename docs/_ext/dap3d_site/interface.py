@@ -1,4 +1,4 @@
-"""Reference of what authors of types import: classes, fields, hooks, words of kernels."""
+"""Reference of what authors of types import: classes, fields, hooks, functions of kernels."""
 
 from collections.abc import Iterator
 
@@ -14,7 +14,7 @@ MAKERS = ("body", "point", "vector", "vector2", "number", "numbers", "vec3", "ma
 #: Annotations of fields: the class of what a scene names there is not seen by the author.
 ANNOTATIONS = ("Body", "Point", "Vector", "Vector2")
 CLASSES = ("Joint", "Force", "Function", "Contact")
-#: Words of kernels by subject.
+#: Functions of kernels by subject.
 WORDS = {
     "Vectors": ("add", "sub", "neg", "scale", "dot", "cross", "norm2", "rotate"),
     "Matrices and rows": ("skew", "eye", "row", "hstack", "matmul", "transpose"),
@@ -52,7 +52,7 @@ def pages() -> Iterator[tuple[str, str]]:
     yield "reference/interface.md", page("Joint, Force, Function, Contact", *_classes())
     yield "reference/fields.md", page("Fields and names", *_fields())
     yield "reference/hooks.md", page("Hooks and entry points", *_hooks())
-    yield "reference/kernel-words.md", page("Words of kernels", *_words())
+    yield "reference/kernel-words.md", page("Functions of kernels", *_words())
 
 
 def _classes() -> Iterator[str]:

@@ -156,7 +156,8 @@ MJCF: Table = {
         ("damper", "adhesion", "dcmotor", "orientation", "pid"),
         moves("", _LAW) | _ACTUATOR,
     ),
-    "actuator/plugin": noted("", "plugins of a simulator are not run"),
+    "actuator/plugin": moves("", "plugins of a simulator are not run"),
+    "body/plugin": moves("", "plugins of a simulator are not run"),
     "sensor": noted("", "sensors"),
     "keyframe": taken(),
     "key": translated("", "where the scene starts, with --key")

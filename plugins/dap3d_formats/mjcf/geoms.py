@@ -20,6 +20,7 @@ from dap3d_core.interface.formats import (
     total_inertia,
 )
 from dap3d_formats.axes import along
+from dap3d_formats.element_table import NO_CONTACTS
 from dap3d_formats.mjcf.document import Document
 
 #: Friction of sliding, spinning and rolling.
@@ -93,9 +94,10 @@ class Geoms:
         bits = [int(geom.number(name, 1.0)) % 2**32 for name in ("contype", "conaffinity")]
         name = geom.get("name") or ""
         surface = name if name in self.paired else ""
-        if not self.document.source.contacts or not (any(bits) or surface):
+        if not (any(bits) or surface) or self.document.disables("contact", "constraint"):
             return None
-        if self.document.disables("contact", "constraint"):
+        if not self.document.source.contacts:
+            self.document.source.remarks.translate(geom.place, NO_CONTACTS, motion=True)
             return None
         given = geom.numbers("friction", None, FRICTION)
         mu, spin, roll = given + FRICTION[len(given) :]

@@ -21,7 +21,7 @@ from dap3d_core.interface.formats import (
     rpy,
 )
 from dap3d_formats.axes import along
-from dap3d_formats.element_table import note_elements
+from dap3d_formats.element_table import NO_CONTACTS, note_elements
 from dap3d_formats.sdf.elements import CONTACTS, SDF
 from dap3d_formats.sdf.frames import FrameGraph
 
@@ -170,6 +170,8 @@ class SdfReader:
         if text_of(element, "self_collide") in ("true", "1"):
             self.self_collide.add(name)
         both = self.source.contacts or not element.all("visual")
+        if element.all("collision") and not self.source.contacts:
+            self.remarks.translate(element.place, NO_CONTACTS, motion=True)
         for tag in ("visual", "collision") if both else ("visual",):
             for shape in element.all(tag):
                 geometry = self._geometry(shape, collision=tag == "collision")

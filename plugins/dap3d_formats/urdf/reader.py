@@ -21,7 +21,7 @@ from dap3d_core.interface.formats import (
     rpy,
 )
 from dap3d_formats.axes import across, unit
-from dap3d_formats.element_table import note_elements
+from dap3d_formats.element_table import NO_CONTACTS, note_elements
 from dap3d_formats.urdf.elements import URDF
 
 #: Type of a joint -> kind of a joint.
@@ -79,6 +79,8 @@ class UrdfReader:
         if inertial is not None:
             link.inertial = self._inertial(inertial)
         both = self.source.contacts or not element.all("visual")
+        if element.all("collision") and not self.source.contacts:
+            self.remarks.translate(element.place, NO_CONTACTS, motion=True)
         for tag in ("visual", "collision") if both else ("visual",):
             for shape in element.all(tag):
                 geometry = self._geometry(shape, collision=tag == "collision")

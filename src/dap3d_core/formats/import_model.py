@@ -55,19 +55,25 @@ class ImportReport:
     notes: tuple[str, ...]
     meshes: dict[Path, str]
 
-    def save(self, scene: Scene, folder: str | os.PathLike[str]) -> Path:
+    def save(self, scene: Scene, folder: str | os.PathLike[str], force: bool = False) -> Path:
         """Write the scene into a folder, with its meshes below; returns the scene file.
 
+        Args:
+            scene: the scene.
+            folder: the folder; it is made where there is none.
+            force: True to overwrite an existing scene file.
+
         Raises:
-            SceneError: the scene cannot be written.
+            SceneError: the scene cannot be written, or exists and ``force`` is off.
             OSError: a mesh cannot be copied.
         """
         target = Path(folder)
+        target.mkdir(parents=True, exist_ok=True)
+        saved = scene.save(target, force)
         for source, name in self.meshes.items():
             (target / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(source, target / name)
-        target.mkdir(parents=True, exist_ok=True)
-        return scene.save(target)
+        return saved
 
 
 @checked
@@ -293,10 +299,10 @@ def _require_file(file: Path) -> None:
     if os.path.isdir(file):
         models = sorted(one.name for one in file.iterdir() if one.suffix in SUFFIXES)
         names = f", such as {', '.join(models[:5])}" if models else ""
-        raise FormatError(f"{file} is a folder", remedy=f"name a file in it{names}")
+        raise FormatError("is a folder", remedy=f"name a file in it{names}")
     if not os.path.exists(file):
         hint = did_you_mean(file.name, _names_in(file.parent), "; {}")
-        raise FormatError(f"there is no file {file}{hint}")
+        raise FormatError(f"there is no such file{hint}")
 
 
 def _names_in(folder: Path) -> list[str]:

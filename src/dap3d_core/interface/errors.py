@@ -1,6 +1,8 @@
 """The error of an unusable type: where the fault is in the author's file, and its remedy."""
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Collection
+from difflib import get_close_matches
 from errno import ENOMEM
 from inspect import get_annotations, getsourcefile, unwrap
 from traceback import extract_tb
@@ -37,7 +39,7 @@ def is_out_of_memory(error: BaseException | None) -> bool:
 
 
 def plain_words() -> str:
-    """The remedy for a kernel written with anything but the words of kernels."""
+    """The remedy for a kernel written with anything but the functions of kernels."""
     from dap3d_core.kernels import __all__ as words  # imports numpy
     from dap3d_core.kernels import scalar_math
 
@@ -76,6 +78,17 @@ def no_field(type_: type, name: str) -> str:
         given = "" if value is attrs.NOTHING else f" = {value!r}"
         return f"{name}: {word}{given} is no field; write {name}: {word} = {_maker(word, value)}"
     return ""
+
+
+def name_hint(type_: type, name: str, names: Collection[str]) -> str:
+    """What may be meant by a name in a kernel that no field offers; or ""."""
+    if name == "self":
+        return "kernels take no self, but fields by their names; "
+    if declared := no_field(type_, name):
+        return f"{declared}; "
+    meant = re.sub(r"^(r_dot|rd)_", "v_", name).replace("omega_", "w_")
+    near = get_close_matches(meant, names, 1)
+    return f"did you mean {near[0]}? " if near else ""
 
 
 def _maker(word: str, value: Any) -> str:

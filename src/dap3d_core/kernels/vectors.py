@@ -94,8 +94,9 @@ def added(a, b):
 def normals(a):
     """Two unit vectors n, m that complete an axis a to a triad: a x n = m, n x m = a.
 
-    n is the coordinate axis least aligned with a, made normal to it. For ``prepare``, not for a
-    kernel.
+    n is the coordinate axis least aligned with a, made normal to it: the first of those that are
+    so but for a fiftieth, that an axis along another turns a little without a jump of n. For
+    ``prepare``, not for a kernel.
 
     Args:
         a: axis, 3 components, any length but zero.
@@ -107,7 +108,8 @@ def normals(a):
     if not length > 0.0:
         raise ValueError("an axis needs a length; this one is zero")
     a = scale(1.0 / length, a)
-    least = min(range(3), key=lambda k: abs(a[k]))
+    largest = min(abs(x) for x in a) + 0.02
+    least = next(k for k in range(3) if abs(a[k]) <= largest)
     n = tuple((1.0 if k == least else 0.0) - a[least] * a[k] for k in range(3))
     n = scale(1.0 / sqrt(norm2(n)), n)
     return n, cross(a, n)

@@ -2,7 +2,7 @@
 
 import hashlib
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.assembly.metric import METRIC_WIDTH
+from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.jumps.jump_arrays import CROSSING, SIDE, JumpArrays
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration_state import IntegrationState
@@ -18,7 +19,7 @@ from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, V, 
 from dap3d_core.native.run.directions import Directions, PairEntry, PairUnit
 from dap3d_core.native.run.elements import Elements
 from dap3d_core.native.run.outputs import Output
-from dap3d_core.native.run.prepared import Advance, PreparedRun
+from dap3d_core.native.run.prepared import Advance, ContactCode, JumpCode, PreparedRun
 from dap3d_core.study.batch import initial_state
 
 KINDS = ("time", "input", "parameter", "output", "state", "derivative", "indicator", "fixed")
@@ -126,6 +127,7 @@ def data_of(
     lines += _enumeration("I", IntegrationState.indices("integer"))
     lines += _enumeration("J", JumpArrays.indices("real"))
     lines += _enumeration("JI", JumpArrays.indices("integer"))
+    lines += _enumeration("CI", ContactArrays.indices("integer"))
     lines += _memory(prepared)
     lines += _completion(prepared)
     lines += _jumps(prepared)
@@ -274,15 +276,21 @@ def _completion(prepared: PreparedRun) -> list[str]:
 
 
 def _jumps(prepared: PreparedRun) -> list[str]:
-    """The function jump_law, and where its arrays are; nothing where velocities do not jump."""
+    """What happens where velocities jump, and where its arrays are; nothing where they do not."""
     law, place = prepared.jumps, prepared.image.at
     if law is None:
-        return ["#define JUMPS 0"]
-    symbol, j = symbol_of(law.entry), law.arguments[0]
-    types = ", ".join(["void *"] * len(law.arguments))
-    given = ", ".join(f"w + {place(part)}" for part in law.arguments)
+        return ["#define JUMPS 0", "#define CONTACTS 0"]
+    switches = prepared.run.present.work.switch_count
     numbers = {
+        "CROSSED_BEHIND_SIDES": (at.CROSSED - at.SIDE) * switches,
+        "COUNT_BEHIND_SIDES": (at.COUNT - at.SIDE) * switches,
+    }
+    if isinstance(law, ContactCode):
+        return [*_defined(numbers), *_contacts(law, place)]
+    j = law.arguments[0]
+    numbers |= {
         "JUMPS": 1,
+        "CONTACTS": 0,
         "JUMP_REAL": place(j.real),
         "JUMP_INTEGER": place(j.integer),
         "JUMP_Y": place(j.y),
@@ -291,12 +299,33 @@ def _jumps(prepared: PreparedRun) -> list[str]:
         "JUMP_ACTING": place(j.acting),
         "ELEMENTS": j.acting.size,
         "DOES_JUMP": place(j.jumps),
-        "CROSSED_BEHIND_SIDES": (at.CROSSED - at.SIDE) * len(j.jumps),
     }
+    return [*_defined(numbers), *_law("void", "jump_law", law, place)]
+
+
+def _contacts(law: ContactCode, place: Callable[[Any], int]) -> list[str]:
+    """The same of contacts that events follow."""
+    s = law.arguments[0]
+    names = ("y", "integer", "limit", "length", "ended", "switches")
+    numbers = {"JUMPS": 0, "CONTACTS": len(law.names)}
+    numbers |= {f"CONTACT_{name.upper()}": place(getattr(s, name)) for name in names}
     return [
         *_defined(numbers),
-        f"void {symbol}(double, {types});",
-        f"static void jump_law(double t, int64_t *w) {{ {symbol}(t, {given}); }}",
+        *_table("static const char *const contact_names[]", map(c_text, law.names)),
+        *_law("int64_t", "contact_law", law, place),
+    ]
+
+
+def _law(
+    result: str, name: str, law: JumpCode | ContactCode, place: Callable[[Any], int]
+) -> list[str]:
+    """A C function that calls a law on the arrays of a run."""
+    symbol, types = symbol_of(law.entry), ", ".join(["void *"] * len(law.arguments))
+    given = ", ".join(f"w + {place(part)}" for part in law.arguments)
+    call = f"{'' if result == 'void' else 'return '}{symbol}(t, {given})"
+    return [
+        f"{result} {symbol}(double, {types});",
+        f"static {result} {name}(double t, int64_t *w) {{ {call}; }}",
     ]
 
 

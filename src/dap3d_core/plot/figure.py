@@ -237,11 +237,11 @@ class EigenvaluePicture(OnePanel):
         ax.axvline(0.0, color="0.6", linewidth=0.8)
         ax.plot(real[~grows], values.imag[~grows], "o", color=PALETTE[0], markersize=4.5)
         ax.plot(real[grows], values.imag[grows], "X", color=PALETTE[1], markersize=5.5)
-        for k, value in enumerate(self.linearization.mode_eigenvalues[:MOST_LABELS]):
+        modes = self.linearization.mode_eigenvalues[:MOST_LABELS]
+        for value, numbers in _labels_of(modes.tolist(), np.ptp([*values.real, 0.0]), 2.0 * size):
             x = value.real if abs(value.real) > REAL_PART_ROUNDING * size else 0.0
-            if abs(value) > 0.0:
-                ax.annotate(str(k + 1), (x, value.imag), xytext=(4, 3), textcoords="offset points",
-                            fontsize=LETTERS)  # fmt: skip
+            ax.annotate(numbers, (x, value.imag), xytext=(4, 3), textcoords="offset points",
+                        fontsize=LETTERS)  # fmt: skip
         if not np.any(real):
             ax.set_xlim(-size, size)
         ax.margins(0.12)
@@ -249,6 +249,26 @@ class EigenvaluePicture(OnePanel):
         ax.set_ylabel("imaginary part [rad/s]", fontsize=LETTERS)
         style_axes(ax)
         return ax
+
+
+def _labels_of(values: Sequence[complex], width: float, height: float) -> list[tuple[complex, str]]:
+    """Eigenvalues other than zero with the numbers of their modes.
+
+    Modes closer than letters have one label, at the first of them.
+    """
+    groups: list[tuple[complex, list[int]]] = []
+    for k, value in enumerate(values):
+        near = [
+            numbers
+            for first, numbers in groups
+            if abs(value.real - first.real) < 0.1 * width + 1e-9 * height
+            and abs(value.imag - first.imag) < 0.06 * height
+        ]
+        if near:
+            near[0].append(k + 1)
+        elif value:
+            groups.append((value, [k + 1]))
+    return [(first, ", ".join(map(str, numbers))) for first, numbers in groups]
 
 
 class Panel(NamedTuple):

@@ -12,8 +12,6 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-import pluggy
-
 from dap3d_core.interface.errors import PluginError, is_out_of_memory
 from dap3d_core.interface.hooks import EXTENSIONS
 from dap3d_core.registry.discovery import BLOCK_VARIABLE, Source
@@ -69,17 +67,14 @@ def guard(source: Source, notes: list[str]) -> Iterator[None]:
         raise KeyboardInterrupt(f"while {_title(source)} was loaded") from error
     except OverdueError as error:
         reason = f"it is not loaded after {error}{_line_of(error)}"
-        raise PluginError(f"{_title(source)}: {reason}. {_remedy(source)}") from error
+        raise PluginError(f"{_title(source)}: {reason}{_remedy(source)}") from error
     except PluginError as error:
-        raise PluginError(f"{_title(source)}: {error}. {_remedy(source)}") from error
-    except pluggy.PluginValidationError as error:
-        raise PluginError(
-            f"{_title(source)}: wrong hook: {' '.join(str(error).split())}. {_remedy(source)}"
-        ) from error
+        reason = str(error).removeprefix(f"{Path(source.module).absolute()}: ")
+        raise PluginError(f"{_title(source)}: {reason}{_remedy(source)}") from error
     except BaseException as error:  # SystemExit too: a plugin does not end the program
         if is_out_of_memory(error) and not isinstance(error, MemoryError):  # of a library's file
             raise MemoryError from error
-        raise PluginError(f"{_title(source)}: {_reason(error)}. {_remedy(source)}") from error
+        raise PluginError(f"{_title(source)}: {_reason(error)}{_remedy(source)}") from error
 
 
 @contextlib.contextmanager
@@ -118,7 +113,7 @@ def _restored(source: Source, folder: str, notes: list[str]) -> Iterator[None]:
 
 def _title(source: Source) -> str:
     if not source.distribution:
-        return f"the model's own file {source.module}"
+        return source.module
     return f"{noun_of(source.kind)} {source.keyword!r} of {source}"
 
 
@@ -128,11 +123,12 @@ def noun_of(kind: str) -> str:
 
 
 def _remedy(source: Source) -> str:
+    """The sentence on what to do with a package; a file is repaired, which needs no words."""
     if not source.distribution:
-        return "Repair the file"
+        return ""
     name = source.distribution
     leaving = f"{BLOCK_VARIABLE}={name}:{source.keyword}"
-    return f"Repair, update or uninstall {name}, or leave it out with {leaving}"
+    return f". Repair, update or uninstall {name}, or leave it out with {leaving}"
 
 
 def _reason(error: BaseException) -> str:

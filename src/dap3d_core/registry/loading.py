@@ -22,7 +22,7 @@ from dap3d_core.interface.types import INTERFACE_VERSION, TypeBase
 from dap3d_core.registry.discovery import Source
 from dap3d_core.registry.guard import guard, within
 from dap3d_core.registry.regular_files import read_regular
-from dap3d_core.registry.suggestions import nearest
+from dap3d_core.registry.suggestions import did_you_mean, nearest
 
 #: What modules of packages bring: the same in all registries of a process.
 _loaded: dict[tuple[Source, ModuleType], TypeInfo] = {}
@@ -130,7 +130,8 @@ def _call_hook(brought: pluggy.HookRelay, kind: str, *, must_exist: bool) -> lis
     types: list[type[TypeBase]] = []
     for result in caller() or [None]:
         if not isinstance(result, (list, tuple)):
-            raise PluginError(f"{hook}() should return a list of classes; it returned {result!r}")
+            given = result.__name__ if inspect.isclass(result) else repr(result)
+            raise PluginError(f"{hook}() should return a list of classes; it returned {given}")
         for type_ in result:
             if not (inspect.isclass(type_) and issubclass(type_, base)):
                 raise PluginError(
@@ -139,8 +140,7 @@ def _call_hook(brought: pluggy.HookRelay, kind: str, *, must_exist: bool) -> lis
                 )
             if not isinstance(type_.keyword, str) or not type_.keyword:
                 raise PluginError(
-                    f'{where_is(type_)} has no keyword; add keyword = "...", without a type '
-                    "behind the name"
+                    f'{where_is(type_)} has no keyword; add keyword = "..." without an annotation'
                 )
             types.append(type_)
     return types
@@ -154,15 +154,30 @@ def hooks_of(module: ModuleType, specs: ModuleType) -> pluggy.HookRelay:
         specs: the module that specifies the hooks.
 
     Raises:
-        PluginError: no interface version, or another one.
-        pluggy.PluginValidationError: a hook is unknown, or of another signature.
+        PluginError: no interface version, or another one; a hook is unknown, not marked, or of
+            another signature.
     """
     _check_version(module)
     manager = pluggy.PluginManager(PROJECT)
     manager.add_hookspecs(specs)
+    _check_hooks(module, manager)
     manager.register(module)
-    manager.check_pending()
     return manager.hook
+
+
+def _check_hooks(module: ModuleType, manager: pluggy.PluginManager) -> None:
+    known = list(vars(manager.hook))
+    for name, function in vars(module).items():
+        if not inspect.isfunction(function):
+            continue
+        if manager.parse_hookimpl_opts(module, name) is None:
+            if name in known:
+                raise PluginError(f"{name}() is not marked; write @hookimpl above it")
+        elif name not in known:
+            hint = did_you_mean(name, known, otherwise=f"hooks: {', '.join(known)}")
+            raise PluginError(f"there is no hook {name}(); {hint}")
+        elif parameters := ", ".join(inspect.signature(function).parameters):
+            raise PluginError(f"the hook {name}() takes no arguments; remove {parameters}")
 
 
 def _check_version(module: ModuleType) -> None:

@@ -188,15 +188,19 @@ class Scene(SceneTables, SceneDisplay, ContactTables):
         return to_toml(self)
 
     @checked
-    def save(self, path: str | Path) -> Path:
+    def save(self, path: str | Path, force: bool = False) -> Path:
         """Write the scene to a file, or to ``scene.toml`` in a folder; returns the file.
 
+        Args:
+            path: the file, or the folder.
+            force: True to overwrite an existing file.
+
         Raises:
-            SceneError: it cannot be written.
+            SceneError: it cannot be written, or exists and ``force`` is off.
         """
         from dap3d_core.scene.files.write_toml import save
 
-        return save(self, path)
+        return save(self, path, force)
 
     def _add(self, table: str, name: str, fields: dict[str, Any]) -> str:
         named, class_ = getattr(self, table), NAMED[table]

@@ -49,7 +49,8 @@ def choose_method(model: Model, requested: str) -> tuple[str, str]:
     """
     if model.contact_count:
         if requested in ("auto", "lsq"):
-            return "lsq", "the scene has contacts"
+            touch = any(hasattr(group.type_info.type, "gap") for group in model.contacts)
+            return "lsq", "the scene has contacts" if touch else "joints have dry friction"
         if requested == "joint" and not model.breaks:
             return "joint", "asked for"
         raise SimulationError(
@@ -67,8 +68,7 @@ def choose_method(model: Model, requested: str) -> tuple[str, str]:
     if not constrained:
         return usual, f"asked for {requested}, but the scene has no joints"
     raise SimulationError(
-        f"method {requested} does not fit: the scene has {len(model.joint_names)} joints with "
-        f"{model.row_count} rows; use {usual} or auto"
+        f"method {requested} does not fit: the scene has joints; use {usual} or auto"
     )
 
 

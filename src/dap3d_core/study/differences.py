@@ -1,7 +1,7 @@
 """Differences of high order, for derivatives of what Python computes."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,10 @@ from dap3d_core.model.state_layout import STATE
 OFFSETS = (-3, -2, -1, 1, 2, 3), (0, 1, 2, 3, 4, 5, 6), (0, -1, -2, -3, -4, -5, -6)
 #: A change of a state, over its size, in differences of functions of it.
 CHANGE = 1e-3
+#: Differences of two orders of a smooth function agree to this part, and this of the largest. Else
+#: steps are so much shorter, and tried so often.
+SMOOTH, ROUNDING = 1e-6, 1e-9
+SHORTER, SHORTER_STEPS = 16.0, 4
 
 
 def power_of_two(length: float) -> float:
@@ -29,11 +33,41 @@ def weights_of(offsets: tuple[int, ...]) -> Floats:
     return np.linalg.solve(powers, np.eye(len(offsets))[1])
 
 
+def slope_at(values: Sequence[Any], offsets: tuple[int, ...], step: float) -> tuple[Any, float]:
+    """The derivative at 0 from values at offsets; how far one of a lower order is from it.
+
+    That is above 1 where a corner or a jump of the function lies among the offsets.
+    """
+    found = weighted(list(zip(weights_of(offsets), values, strict=True))) / step
+    kept = [k for k, offset in enumerate(offsets) if abs(offset) < max(map(abs, offsets))]
+    lower = weights_of(tuple(offsets[k] for k in kept))
+    other = weighted([(w, values[k]) for w, k in zip(lower, kept, strict=True)]) / step
+    size = np.abs(found)
+    limit = SMOOTH * size + ROUNDING * np.max(size, initial=0.0)
+    parts = np.abs(found - other) / np.where(limit > 0.0, limit, 1.0)
+    return found, float(np.max(parts, initial=0.0))
+
+
+def best_of(tries: Iterable[tuple[Any, float]]) -> Any:
+    """The first derivative of some that is of a smooth function, or that which is most so."""
+    best, least = None, np.inf
+    for found, missed in tries:
+        if best is None or missed < least:
+            best, least = found, missed
+        if not 1.0 < missed <= least:
+            break
+    return best
+
+
 def differences(function: Callable[[float], Floats], step: float) -> Floats:
-    """The derivative at 0 of a function, by central differences of sixth order."""
+    """The derivative at 0 of a function, by central differences of sixth order.
+
+    Steps become shorter as long as a corner or a jump of the function lies among them.
+    """
     offsets = OFFSETS[0]
-    pairs = zip(offsets, weights_of(offsets), strict=True)
-    return weighted([(w, function(k * step)) for k, w in pairs]) / step
+    tries = (slope_at([function(k * h) for k in offsets], offsets, h)
+             for h in step / SHORTER ** np.arange(SHORTER_STEPS))  # fmt: skip
+    return np.asarray(best_of(tries))
 
 
 def weighted(pairs: Sequence[tuple[float, Any]]) -> Any:

@@ -12,7 +12,7 @@ from dap3d_core.interface.codegen.reactions import joints_read
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError, where_is
 from dap3d_core.interface.examine.examine import examine
-from dap3d_core.testing.checks import branches, forces, joints, purity
+from dap3d_core.testing.checks import branches, elements, forces, joints, purity
 from dap3d_core.testing.checks.findings import (
     FAILED,
     LEFT_OUT,
@@ -21,7 +21,7 @@ from dap3d_core.testing.checks.findings import (
     Report,
     TypeMotion,
 )
-from dap3d_core.testing.checks.joints import motion_of_type
+from dap3d_core.testing.checks.motion import motion_of_type
 from dap3d_core.testing.samples.sampled_type import SampledType, UndefinedError, sampled_types
 
 #: Default number of random poses on and off the manifold, and their seed.
@@ -98,9 +98,10 @@ def check_type(type_: Any, *, poses: int = POSES, seed: int = SEED) -> Report:
     """
     type_info = type_ if isinstance(type_, TypeInfo) else examine(type_)
     outcomes = tuple(check.run() for check in _checks(type_info, poses, seed))
-    kind, keyword = type_info.type.kind, type_info.type.keyword
+    kind = "contact" if type_info.type.is_contact else type_info.type.kind
     motions = type_motions(type_info, seed=seed)
-    return Report(kind, keyword, where_is(type_info.type), seed, poses, outcomes, motions)
+    title = where_is(type_info.type)
+    return Report(kind, type_info.type.keyword, title, seed, poses, outcomes, motions)
 
 
 def type_motions(type_info: TypeInfo, *, seed: int = SEED) -> tuple[TypeMotion, ...]:
@@ -143,7 +144,7 @@ def _checks(type_info: TypeInfo, poses: int, seed: int) -> list[Check]:
         raise ValueError(f"poses is {poses}; a check takes one or more")
     of_kind: dict[str, Callable[[SampledType], list[Check]]] = {
         "joint": _of_joint, "force": _of_force,
-        "function": lambda subject: [Check("derivatives", subject, "", forces.derivatives)],
+        "function": lambda subject: [Check("derivatives", subject, "", elements.derivatives)],
     }  # fmt: skip
     checks = []
     for subject in sampled_types(type_info, seed, poses):
@@ -154,8 +155,8 @@ def _checks(type_info: TypeInfo, poses: int, seed: int) -> list[Check]:
         checks += of_kind[subject.type.kind](subject)
         if "rate" in subject.type_info.kernels:
             ground = joints.against_ground(subject)
-            checks.append(Check("rate", subject, "", forces.tangent))
-            checks.append(Check("rate frame", subject, ground, forces.rate_frame))
+            checks.append(Check("rate", subject, "", elements.tangent))
+            checks.append(Check("rate frame", subject, ground, elements.frame))
         checks.append(Check("branches", subject, "", branches.switches))
         checks.append(Check("rest", subject, "", branches.rest))
         checks.append(Check("purity", subject, "", purity.purity))
@@ -187,9 +188,9 @@ def _of_joint(subject: SampledType) -> list[Check]:
     if "G" in subject.type_info.kernels:
         checks.insert(0, Check("G", subject, "", joints.gradient_of_unknowns))
     if subject.type.is_contact and not subject.type.is_friction_alone():
-        checks.append(Check("normal", subject, "", forces.normal))
+        checks.append(Check("normal", subject, "", elements.normal))
     if subject.type.is_contact and subject.type.grip is not None:
-        checks.append(Check("grip", subject, "", forces.grip))
+        checks.append(Check("grip", subject, "", elements.grip))
     checks += _of_jumps(subject)
     if "friction" in subject.type_info.kernels:
         checks.append(Check("friction power", subject, "", _on_friction(forces.dissipation)))

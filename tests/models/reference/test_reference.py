@@ -24,7 +24,7 @@ from scipy.integrate import solve_ivp
 pytestmark = pytest.mark.slow
 
 #: Nothing of dap3d is in them: they change with these scripts and with models/**/expected.toml.
-LONG = {"pen2", "bicycle", "A02-40"}
+LONG = {"pen2", "bicycle", "bodies2", "quarter_car", "A02-40", "A04"}
 MODELS = [
     pytest.param(name, marks=pytest.mark.long) if name in LONG else name
     for name in check_expected.ALL

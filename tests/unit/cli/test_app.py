@@ -5,11 +5,11 @@ import sys
 
 import pytest
 from click.testing import CliRunner
+from support.internals import INTEGRATORS, METHODS
 
 from dap3d_core.cli import main
 from dap3d_core.cli.app import COMMANDS, SYNONYMS, dap3d
 from dap3d_core.cli.process import exit_codes
-from dap3d_core.settings import INTEGRATORS, METHODS
 
 
 def test_every_command_has_help_and_the_common_options():

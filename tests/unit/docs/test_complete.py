@@ -14,16 +14,24 @@ import attrs
 import click
 import pytest
 from support.command_line import dap3d
-from support.internals import specs_of
+from support.internals import INTEGRATORS, METHODS, sample_classes, sized_fields, specs_of
 from support.process import REPOSITORY
 
 import dap3d_core as dap
 from dap3d_core import interface, kernels
 from dap3d_core.interface import hooks
+from dap3d_core.interface.codegen.instance_layout import layout_of
+from dap3d_core.interface.codegen.kernel_arguments import (
+    SLIP,
+    VELOCITY_KERNELS,
+    friction_names,
+    namespace,
+)
+from dap3d_core.interface.examine.sized_types import described
+from dap3d_core.interface.types import BodyPose
 from dap3d_core.scene import Simulation
 from dap3d_core.scene.coerce import keys_of
 from dap3d_core.scene.tables import HEADER_KEYS, NAMED, TABLES, Animation
-from dap3d_core.settings import INTEGRATORS, METHODS
 
 DOCS = REPOSITORY / "docs"
 #: Members of a class that have docstrings of their own.
@@ -145,18 +153,10 @@ class Three(interface.Force):
 
 def names_of(line="", constants=()):
     """The names of the position and of the velocity level with one more field, or constants."""
-    from dap3d_core.interface.codegen.instance_layout import layout_of
-    from dap3d_core.interface.codegen.kernel_arguments import namespace
-    from dap3d_core.interface.fields import sized_fields
-
     members = {"__module__": __name__}
     exec(line, vars(interface) | {}, members)
     type_ = type("Added", (Three,), members)
     if sized_fields(type_):
-        from support.internals import sample_classes
-
-        from dap3d_core.interface.examine.sized_types import described
-
         type_ = sample_classes(type_)[0]
     found = namespace(type_, layout_of(type_, dict(constants)))
     if hasattr(type_, "shape_of_lists"):
@@ -181,9 +181,6 @@ def test_the_names_of_each_field_are_those_of_the_sources():
 
 def test_the_names_besides_those_of_fields_are_those_of_the_sources():
     """Of time, of a function's argument, of friction, of what prepare returns; of its bodies."""
-    from dap3d_core.interface.codegen.kernel_arguments import SLIP, VELOCITY_KERNELS, friction_names
-    from dap3d_core.interface.types import BodyPose
-
     page = (DOCS / "reference" / "names.md").read_text()
     besides = rows_of(page, "where | names")
     jumps = [[{"crossing"}], [{"Jv"}]]

@@ -5,14 +5,13 @@ at random, far off the constraints, where a simplified row would show."""
 
 import numpy as np
 import pytest
-from support.internals import correct_initial, join, split
+from support.internals import Evaluator, correct_initial, join, split
 from support.motions import G, Motion
 from support.process import REPOSITORY
 from support.rotations import rotation, to_body
 
 import dap3d_core as dap
 from dap3d_core.formulations import RHS
-from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import build_model
 from dap3d_core.scene import check
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from support.internals import extensions
 
 import dap3d_core as dap
 from dap3d_core.interface import PluginError
-from dap3d_core.registry.extensions import extensions
 from dap3d_core.scene import check
 from dap3d_core.view.scene3d.shapes import scene_shapes
 

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 from support.graphs import chain, star
-from support.internals import compiled
+from support.internals import compiled, order_nodes
 
 from dap3d_core.linear.lu import factor_lu, make_lu_plan, solve_lu
-from dap3d_core.linear.ordering.elimination_order import order_nodes
 
 
 @compiled

@@ -7,9 +7,9 @@ from functools import partial
 import attrs
 import numpy as np
 import pytest
+from support.internals import placed_shapes
 
 import dap3d_core as dap
-from dap3d_core.assembly.collisions import placed_shapes
 from dap3d_core.integrators.moreau import arrays
 from dap3d_core.native.build import own_platform
 
@@ -404,11 +404,6 @@ def test_a_run_ends_where_contacts_have_no_room(tmp_path, monkeypatch):
     for t in (1.0, 2.0):  # it stays an error
         with pytest.raises(dap.SimulationError, match=said):
             run.step_to(t)
-
-
-def test_contacts_that_events_follow_are_refused(tmp_path):
-    with pytest.raises(dap.SimulationError, match="export does not take contacts yet"):
-        dap.export_model(declared_ball(), tmp_path / "ball.fmu", format="fmu")
 
 
 def test_a_folder_of_another_model(tmp_path):

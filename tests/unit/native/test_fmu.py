@@ -62,10 +62,19 @@ def test_times_of_model_exchange_may_round_beyond_the_end(tmp_path, fmi):
     fmu.freeInstance()
 
 
+def touching():
+    """A ball that bounces by a contact which events follow."""
+    scene = bouncing()
+    del scene.forces["floor"]
+    scene.add_contact("ball_plane", "floor", P_i="ball.O", e=0.8)
+    return scene
+
+
 @VERSIONS
-def test_velocities_jump_at_events_of_model_exchange(tmp_path, fmi):
+@pytest.mark.parametrize("make", [bouncing, touching])
+def test_velocities_jump_at_events_of_model_exchange(tmp_path, fmi, make):
     """A ball from 1 m: at rest on top of the next flight, e^2 = 0.64 m, after V (1 + e)/g."""
-    made = written(bouncing(), tmp_path, fmi=fmi, outputs=["ball.r"])
+    made = written(make(), tmp_path, fmi=fmi, outputs=["ball.r"])
     t = np.sqrt(2.0 / 9.81) * 1.8
     rows = fmpy.simulate_fmu(str(made.path), stop_time=t, output_interval=0.01, solver="CVode",
                              fmi_type="ModelExchange", relative_tolerance=1e-8)  # fmt: skip

@@ -78,3 +78,15 @@ def test_undamped_modes_are_on_the_axis():
     z, _ = points_of(ax)
     assert np.all(z.real == 0.0)
     assert ax.get_xlim()[0] < -5.0
+
+
+def test_modes_that_are_close_have_one_label():
+    """Letters of their own would lie on one another."""
+    scene = dap.Scene(name="springs")
+    for k, stiffness in enumerate((100.0, 102.0, 900.0)):
+        scene.add_body(f"b{k}", mass=1.0, Jp=(1.0, 1.0, 1.0), r=(1.0, float(k), 0.0))
+        scene.add_point(f"o{k}", "ground", (0.0, float(k), 0.0))
+        scene.add_joint("tran", P_i=f"b{k}.O", P_j=f"o{k}", a_j="ground.x")
+        scene.add_force("ptp", P_i=f"b{k}.O", P_j=f"o{k}", k=stiffness, l0=1.0)
+    ax = dap.plot(dap.linearize(scene))
+    assert [text.get_text() for text in ax.texts] == ["1, 2", "3"]

@@ -137,21 +137,25 @@ def test_the_listing_has_every_kind_with_its_state(install, kind):
     assert (info.distribution, info.version, info.module) == ("parts", "1.2", module)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+#: What is done to the text of a module -> what the listing says of it.
+CHANGES = [
+    (lambda text: "x = = 1\n", "SyntaxError"),
+    (lambda text: text.replace("dap3d_core.interface", "none.interface"), "ModuleNotFound"),
+    (lambda text: text.replace("return [", "return 3 or ["), "'int' object is not iterable"),
+    (lambda text: text.replace("    return [", "    return 0 and ["), "none with the keyword"),
+    (lambda text: "raise SystemExit(3)\n", "SystemExit: 3"),
+]
+#: Keeps a core busy for the seconds that the listing allows, whatever the kind.
+NEVER_LOADED = (lambda text: "while True: pass\n", "not loaded after 0.3 s")
+
+
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("kind", "change", "words"),
     [
-        (lambda text: "x = = 1\n", "SyntaxError"),
-        (lambda text: text.replace("dap3d_core.interface", "none.interface"), "ModuleNotFound"),
-        (lambda text: text.replace("return [", "return 3 or ["), "'int' object is not iterable"),
-        (lambda text: text.replace("    return [", "    return 0 and ["), "none with the keyword"),
-        (lambda text: "raise SystemExit(3)\n", "SystemExit: 3"),
-        # keeps a core busy for the seconds that the listing allows
-        pytest.param(lambda text: "while True: pass\n", "not loaded after 0.3 s",
-                     marks=pytest.mark.slow),
+        *((kind, *change) for kind in KINDS for change in CHANGES),
+        pytest.param("integrator", *NEVER_LOADED, marks=pytest.mark.slow),
     ],
-    ids=["syntax", "import", "number", "nothing", "exit", "never loaded"],
-)  # fmt: skip
+)
 def test_the_listing_says_what_is_wrong_with_one_and_lists_all_others(install, kind, change, words):
     text, keyword = KINDS[kind]
     install("parts", change(text), keyword, f"dap3d.{kind}s")

@@ -181,8 +181,8 @@ def test_an_import_loads_one_format(file, needed):
 @pytest.mark.parametrize("keyword", ["f", "fp", "n", "np", "ptp", "rot_sda"])
 def test_a_force_without_a_factor_has_the_loop_of_one_that_knows_of_none(keyword):
     """Its instances have the integers of its bodies alone, and its loop reads no function."""
-    from dap3d_core.interface.codegen.compile_loops import write
-    from dap3d_core.interface.codegen.loop_source import stride
+    from support.internals import stride, write
+
     from dap3d_core.registry import load_registry
 
     type_info = load_registry().get("force", keyword)

@@ -4,10 +4,11 @@ import random
 
 import numpy as np
 import pytest
+from support.internals import rotation as rotation_of_a_model
+from support.internals import sampled_types
 from support.plain import jit_is_on
 
 from dap3d_core.interface import examine
-from dap3d_core.model.rotations import rotation as rotation_of_a_model
 from dap3d_core.testing import check_type, checks_for
 from dap3d_core.testing.samples.random_state import (
     BODIES,
@@ -16,7 +17,6 @@ from dap3d_core.testing.samples.random_state import (
     random_state,
     rotation,
 )
-from dap3d_core.testing.samples.sampled_type import sampled_types
 from dap3d_forces.weight import Weight
 from dap3d_functions.polynomial import Polynomial
 from dap3d_joints.spherical import Spherical

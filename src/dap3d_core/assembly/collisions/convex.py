@@ -4,11 +4,13 @@ The gap of solids along a unit vector n from j to i is s(n) = min n x over i - m
 of the solids is its largest value, also where they overlap a little. There n is the normal of a
 face, or across an edge of each, or across one edge and best along that circle, or s is smooth. All
 of these are tried, the last two by Newton's method from what ``nearest`` finds. Any n has an s that
-is no more than the gap, so that one too many does no harm.
+is no more than the gap, so that one too many does no harm. Where the other solid lies over a face
+of a box or a cylinder, that is known at once.
 """
 
 import math
 
+from dap3d_core.assembly.collisions.boxes import dot_axis
 from dap3d_core.assembly.collisions.distance import APART, FAR_APART, A, B, V, dot, nearest
 from dap3d_core.assembly.collisions.manifold import E1, E2, POLYGON, put_points, tangents
 from dap3d_core.assembly.collisions.supports import FLAT, curvature, radius_of, support
@@ -172,23 +174,15 @@ def flat_directions(
     kind: Integers, centre: Floats, axes: Floats, size: Floats, corners: Integers,
     vertices: Floats, work: Floats,
 ) -> float:  # fmt: skip
-    """Try normals of faces, and of pairs of edges."""
+    """Try normals of faces of hulls, and of pairs of edges."""
     for side in range(2):
         k, first, edges = (i, EI, edges_i) if side == 0 else (j, EJ, edges_j)
-        if kind[k] == BOX or kind[k] == CYLINDER:
-            for e in range(edges):
-                for r in range(3):
-                    work[N, r] = work[first + e, r]
-                best = attempt(
-                    i, j, best, better, kind, centre, axes, size, corners, vertices, work
-                )
-        elif kind[k] == HULL:
-            for e in range(edges):
-                for f in range(e + 1, edges):
-                    cross(work[first + e], work[first + f], work[N])
-                    if dot(work[N], work[N]) > FLAT:
-                        best = attempt(i, j, best, better, kind, centre, axes, size, corners,
-                                       vertices, work)  # fmt: skip
+        for e in range(edges if kind[k] == HULL else 0):
+            for f in range(e + 1, edges):
+                cross(work[first + e], work[first + f], work[N])
+                if dot(work[N], work[N]) > FLAT:
+                    best = attempt(i, j, best, better, kind, centre, axes, size, corners,
+                                   vertices, work)  # fmt: skip
     for e in range(edges_i):
         for f in range(edges_j):
             cross(work[EI + e], work[EJ + f], work[N])
@@ -200,13 +194,53 @@ def flat_directions(
 
 
 @compiled
+def own_faces(
+    i: int, j: int, better: float, kind: Integers, centre: Floats, axes: Floats, size: Floats,
+    corners: Integers, vertices: Floats, work: Floats,
+) -> tuple[float, bool]:  # fmt: skip
+    """Try normals of faces of boxes and cylinders; the gap, and whether none can be larger.
+
+    None is where the nearest point of the other solid lies over the face, or in the solid and
+    nearest to this face: along any direction the gap is that of the point at most.
+    """
+    best, side, along = -1e300, 0, 2
+    for one in range(2):
+        k = i if one == 0 else j
+        for e in range(0 if kind[k] == BOX else 2, 3 if kind[k] in (BOX, CYLINDER) else 0):
+            for r in range(3):
+                work[N, r] = axes[k, 3 * r + e]
+            new = attempt(i, j, best, better, kind, centre, axes, size, corners, vertices, work)
+            if new > best:
+                best, side, along = new, one, e
+    if best == -1e300:
+        return best, False
+    k, deep, p, q = j if side else i, max(0.0, -best), work[PI], work[PJ]
+    support(i + j - k, 1.0 - 2.0 * side, work[BEST], kind, centre, axes, size, corners, vertices, p)
+    for r in range(3):
+        q[r] = p[r] - centre[k, r]
+    x, y, z = q[0], q[1], q[2]
+    for r in range(3):
+        q[r] = abs(dot_axis(axes[k], r, x, y, z))
+    if kind[k] == CYLINDER:
+        over = math.sqrt(q[0] * q[0] + q[1] * q[1]) <= size[k, 0] - deep
+        return best, over and deep <= size[k, 1]
+    over = deep <= size[k, along]
+    for r in range(3):
+        over = over and (r == along or q[r] <= size[k, r] - deep)
+    return best, over
+
+
+@compiled
 def part_best(
     i: int, j: int, most: float, kind: Integers, centre: Floats, axes: Floats, size: Floats,
     corners: Integers, vertices: Floats, work: Floats,
 ) -> float:  # fmt: skip
     """Put the direction of the largest gap of cores into BEST; the gap, or one beyond ``most``."""
-    best, count, status = -1e300, 0, 0
+    count, status = 0, 0
     better = BETTER * (math.sqrt(dot(size[i], size[i])) + math.sqrt(dot(size[j], size[j])))
+    best, is_largest = own_faces(i, j, better, kind, centre, axes, size, corners, vertices, work)
+    if is_largest:
+        return best
     for turn in range(4):
         part = ALL if turn == 0 else NEARLY if turn == 1 else LESS if turn == 2 else HALF
         far = most if turn == 0 else 1e300

@@ -1,5 +1,6 @@
 """``dap3d export``: a result, or a model, as a file for another program."""
 
+import contextlib
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -33,8 +34,8 @@ NATIVE_OPTIONS = {
     "Write a result or a model for another program.",
     options.RESULT,
     click.option("-f", "--format", "kind", metavar="NAME",
-                 help="vtk, gltf, mat or csv of a result, by default that of the file, or vtk; "
-                 "urdf, mjcf, c, fmu or that of a plugin of a MODEL."),
+                 help="vtk, gltf, mat or csv of a result; urdf, mjcf, c, fmu or that of a plugin "
+                 "of a MODEL; by default what the suffix of the file says, or vtk."),
     options.output("A file; RESULT, or the name of MODEL, and the suffix by default."),
     options.FPS, options.MODEL_OF_RESULT, options.ALLOW_CODE,
     click.option("--strict", is_flag=True,
@@ -81,11 +82,29 @@ def export(
     for name, value in of_native.items():
         if value:
             raise Refused(f"{words.get(name, f'--{name}')} is of formats c and fmu")
+    kind = kind or _model_format(output)
     if kind is not None and kind not in result_exporters():
         return _export_model(result, kind, output, strict=strict, force=force)
+    if Path(result).suffix in ("", ".toml"):
+        raise Refused(f"{result} is a model, no result; name a format of models, such as -f fmu")
     return _export_result(
         result, kind, output, fps=fps, model=model, allow_code=allow_code, force=force
     )
+
+
+def _model_format(output: str | None) -> str | None:
+    """The format of models that has the suffix of a file; None for those of results."""
+    from dap3d_core.exchange import result_exporters
+    from dap3d_core.interface.errors import PluginError
+    from dap3d_core.registry.extensions import extensions
+
+    suffix, formats = Path(output or "").suffix, extensions("exporter")
+    of_models = [one for one in formats.keywords if suffix and one not in result_exporters()]
+    for keyword in of_models:
+        with contextlib.suppress(PluginError):
+            if formats.load(keyword).suffix == suffix:
+                return keyword
+    return None
 
 
 def _export_result(

@@ -67,7 +67,7 @@ def write_folder(scene: "Scene", report: Any, path: Path, *, force: bool, stub: 
     plugin = None
     if stub and report.stub:
         plugin = writable(target.parent / "plugin.py", force=force, sources=sources)
-    scene.save(target)
+    scene.save(target, force=True)
     if plugin is not None:
         write_text(plugin, report.stub)
     holds = {table: len(getattr(scene, table)) for table, _, _ in TABLES}

@@ -109,7 +109,7 @@ def _save(scene: "Scene", report: "ImportReport", folder: Path, file: Path, *, f
         _make((folder / name).parent)
         writable(folder / name, force=force, sources=sources)
     try:
-        return report.save(scene, folder)
+        return report.save(scene, folder, force=True)
     except OSError as error:
         raise Refused(f"cannot write {folder}: {error.strerror or error}") from error
 
@@ -170,7 +170,7 @@ def _show(console: "Terminal", scene: "Scene", report: "ImportReport", target: P
     from dap3d_core.cli.console.console import count
 
     console.title(f"{report.format} model {scene.name}")
-    taken = ", ".join(f"{number} {part}" for part, number in report.taken.items() if number)
+    taken = ", ".join(count(n, part.removesuffix("s")) for part, n in report.taken.items() if n)
     console.facts([("taken", taken)])
     both = {"translated with a difference": report.translated, "left out": report.left_out}
     for motion, word in ((True, " (the motion is another)"), (False, "")):

@@ -192,7 +192,7 @@ def live_line(run: "RunProgress", rate: float, width: int) -> str:
 
     Numbers have fixed widths, so that the line does not jump.
     """
-    percent, end = f"{run.t / run.t_end if run.t_end else 1.0:4.0%}", f"{run.t_end:.4g}"
+    percent, end = f"{run.t / run.t_end if run.t_end else 1.0:4.0%}", f"{run.t_end:.6g}"
     digits = max(0, 3 - math.floor(math.log10(run.t_end or 1.0)))
     now = f"{run.t:{len(f'{run.t_end:.{digits}f}')}.{digits}f}"
     pace = f"{rate:.3g}" if rate else "-"

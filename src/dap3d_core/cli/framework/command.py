@@ -81,7 +81,8 @@ class Command(click.Command):
         for param in self.params:
             value = ctx.params.get(param.name or "")
             if value == "" or (isinstance(value, tuple) and "" in value):
-                raise click.UsageError(f"{param.get_error_hint(ctx)} is an empty word", ctx)
+                hint = param.get_error_hint(ctx).replace("[", "").replace("]", "")
+                raise click.UsageError(f"{hint} is empty", ctx)
         return rest
 
     def invoke(self, ctx: click.Context) -> Any:

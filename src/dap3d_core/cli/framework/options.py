@@ -35,7 +35,14 @@ class Tolerance(click.ParamType):  # type: ignore[type-arg]
                       param, ctx)  # fmt: skip
 
 
-class FiniteFloat(click.types.FloatParamType):
+class Number(click.types.FloatParamType):
+    """A number, with its unit in messages."""
+
+    def __init__(self, unit: str = "") -> None:
+        self.name = f"number in {unit}" if unit else "number"
+
+
+class FiniteFloat(Number):
     """A finite number.
 
     Attributes:
@@ -43,6 +50,7 @@ class FiniteFloat(click.types.FloatParamType):
     """
 
     def __init__(self, *, positive: bool = False) -> None:
+        super().__init__()
         self.positive = positive
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
@@ -91,8 +99,8 @@ def _setting(setting: Setting) -> Option:
         return click.option(setting.option, type=click.Choice(setting.words), help=text)
     if setting.kind == "tolerance":
         return click.option(setting.option, type=Tolerance(), metavar="X", help=text)
-    metavar = "S" if setting.kind in ("end", "time") else "X"
-    return click.option(setting.option, type=float, metavar=metavar, help=text)
+    unit = "s" if setting.kind in ("end", "time") else ""
+    return click.option(setting.option, type=Number(unit), metavar=unit.upper() or "X", help=text)
 
 
 #: Settings of a run that the command line overrides: name in the scene -> option, its name.

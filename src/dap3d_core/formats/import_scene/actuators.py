@@ -112,8 +112,7 @@ def _act_on_tendon(builder: SceneBuilder, model: Articulation, actuator: Actuato
     """Add an actuator or a muscle of a tendon, whose tension is less its force."""
     line = None if actuator.tendon is None else line_of(builder, model, actuator.tendon)
     if line is None:
-        text = "an actuator of a tendon that does not move"
-        builder.remarks.leave_out(actuator.place, text, motion=True)
+        builder.remarks.leave_out(actuator.place, "an actuator of a tendon that does not move")
         return
     keyword, fields = ("tendon" if line[0] == "ptp" else line[0]), line[1]
     name = _input(builder, actuator)
@@ -140,7 +139,7 @@ def add_tendons(builder: SceneBuilder, model: Articulation) -> None:
         line = line_of(builder, model, tendon)
         if line is None:
             text = "springs and limits of a tendon that does not move"
-            builder.remarks.leave_out(tendon.place, text, motion=True)
+            builder.remarks.leave_out(tendon.place, text)
             continue
         keyword, fields = line
         spring: dict[str, Any] = {"k": tendon.stiffness or None, "c": tendon.damping or None}

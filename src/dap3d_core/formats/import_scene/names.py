@@ -22,15 +22,15 @@ class Names:
 
     def of(self, table: str, name: str, place: Place, remarks: Remarks) -> str:
         """A name that the scene can have: the same one, or one made of it, which is remarked."""
-        good = self.free(table, usable(name))
+        good = self.free(table, name)
         self.scene_names[table, name], self.places[table, good] = good, place
         if good != name:
             remarks.translate(place, f"{name!r} is called {good!r} in the scene")
         return good
 
     def free(self, table: str, name: str) -> str:
-        """The name, or the first of NAME_2, NAME_3, ... that is free, which is taken."""
-        taken = self.taken.setdefault(table, set())
+        """A name that the scene can have, or the first of NAME_2, ... that is free: it is taken."""
+        taken, name = self.taken.setdefault(table, set()), usable(name)
         number, candidate = 1, name
         while candidate in taken:
             number += 1

@@ -21,6 +21,28 @@ def _integer() -> Scalar[int]:
     return Scalar("integer")
 
 
+def _real() -> Scalar[float]:
+    return Scalar("real")
+
+
+@attrs.define(eq=False, kw_only=True, slots=False)
+class ContactOutputs(Arrays):
+    """What contacts say of themselves, by the loops of their types.
+
+    Its numbers are those of the kernel ``tension`` (interface/contacts/rows.py).
+    """
+
+    types: ClassVar[dict[str, Any]] = {
+        "groups": INTEGER_MATRIX, "which": INTEGERS, "found": MATRIX,
+    }  # fmt: skip
+
+    groups: Integers  # (loops, 5) i0, p0, count; numbers of a contact; first of ``which``
+    which: Integers  # (m,) contacts, in the order of the loops
+    found: Floats  # (m, WIDTH)
+    values: Floats  # scratch of a loop
+    place: Floats  # (1,)
+
+
 @attrs.define(eq=False, kw_only=True, slots=False)
 class ContactArrays(Arrays):
     """Contacts at one instant: m of them, of which l have friction that a joint loads.
@@ -31,16 +53,19 @@ class ContactArrays(Arrays):
 
     types: ClassVar[dict[str, Any]] = {
         "cone": Cone.type_of(),
+        "says": ContactOutputs.type_of(),
         **dict.fromkeys(
             ("integer", "newton", "alone", "load_row", "load_count", "load_pushes", "touching",
              "closed", "group", "kept", "mine", "begins", "leaves", "gone", "slides", "slipping",
-             "jams", "order", "rows", "before", "along_with"),
+             "jams", "order", "rows", "before", "along_with", "state", "frame_body", "model_row",
+             "in_touch", "stops", "opening", "is_low", "rests_soon", "role", "is_active", "active"),
             INTEGERS,
         ),
-        **dict.fromkeys(("holds", "feels"), INTEGER_MATRIX),
+        **dict.fromkeys(("holds", "feels", "switches", "ended", "taking"), INTEGER_MATRIX),
         **dict.fromkeys(
             ("W", "reaction", "slip", "begin_way", "along", "way", "near", "force", "B", "w",
-             "taken", "rests"),
+             "taken", "rests", "J", "scaled", "moves", "K", "answers", "driven", "kept_way",
+             "impulses", "restitution"),
             MATRIX,
         ),
         "frames": TENSOR,
@@ -51,9 +76,18 @@ class ContactArrays(Arrays):
     group_count = _integer()
     kept_count = _integer()
     mine_count = _integer()
+    in_touch_count = _integer()
+    is_free = _integer()  # 1: ``free`` is of the present velocities
+    starts = _integer()  # 1 at the start of a run
+    jammed = _integer()  # a contact that has been found to jam, or -1
+    culprit = _integer()  # a contact with which no motion goes on
+    round_count = _integer()  # of those kept
+    exchanged = _real()  # J, sum of the magnitudes of work
 
     cone: Cone
+    says: ContactOutputs
     integer: Integers
+    real: Floats
     # constants
     mu: Floats  # (m,) along the first tangent, and along the second as a part of that
     mu_s: Floats
@@ -65,19 +99,42 @@ class ContactArrays(Arrays):
     newton: Integers  # 1 where the law of impact is Newton's
     alone: Integers  # 1 of friction without a gap: of joints
     holds: Integers  # (m, 3) 1 of rows that act where it sticks
+    turns: Floats  # 1 of those whose gap or slip is an angle
+    state: Integers  # the first of their numbers among the states of elements
+    switches: Integers  # (m, 2) among those of the model
+    frame_body: Integers  # a body, and 1 or -1: its block of their rows is the frame
+    frame_sign: Floats
+    model_row: Integers  # rows of the model, in the order of the plan
     load_row: Integers  # (m,) first row of the joint that loads its friction, their number, and 1
     load_count: Integers  # where that pushes alone; none where there is no such load
     load_pushes: Integers
     # at the instant, as if all contacts stuck, with the joints held
+    y: Floats  # the state in coordinates of bodies
+    placed: Floats  # the same with present velocities
+    report: Floats
+    v: Floats  # (6 n,) r_dot and omega at present, and before
+    v_before: Floats
+    push: Floats  # changes of them, or small r and rotation vectors
+    J: Floats  # (rows of all, 6 n) along global axes, and scaled
+    scaled: Floats
+    unit: Floats  # (rows,) of joints: 1 over their lengths, and scratch
+    unit_of: Floats
+    K: Floats  # (rows, 6 n) their factors; columns of the pseudo-inverse
+    answers: Floats
+    moves: Floats  # (3 m, 6 n) changes of scaled velocities by unit impulses
+    driven: Floats  # (m, 3) velocity of the motion that drivers prescribe
     W: Floats  # (3 m, 3 m) changes of slip by impulses
     free: Floats  # (3 m,) rates of slip where all contacts are open
     slip: Floats  # (m, 3)
+    closing: Floats  # (m,) rates of gaps
     load: Floats  # (m,) of friction alone, by which mu is multiplied
     frames: Floats  # (m, 3, 3)
     feels: Integers  # (m, m) 1 where one changes slip or load of the other
     lam_free: Floats  # (rows,) multipliers of joints where all contacts are open
     reaction: Floats  # (rows, 3 m) their changes by forces
     # what is asked for
+    ended: Integers  # (m, 2) 1 of switches that have changed their sign
+    limit: Floats  # (m,) gaps below which bodies touch
     touching: Integers  # contacts of no gap
     begins: Integers  # 1 of those at rest that begin to slide, and the direction of that
     begin_way: Floats
@@ -88,6 +145,27 @@ class ContactArrays(Arrays):
     near: Floats  # friction alone that sticks 1 for rows that do not hold, as others hold that;
     force: Floats  # forces on body i of those that share, global axes; forces in their frames
     jams: Integers  # 1 of contacts that jam
+    moved: Floats  # (6 n,) small r and rotation vectors
+    # of an event
+    was: Floats  # (m,) modes before
+    in_touch: Integers  # contacts that touch
+    stops: Integers  # 1 of those whose slip is stopped
+    opening: Integers  # 1 of those that open again at once
+    impulses: Floats  # (m, 3); work, J, of each and of drivers that it makes work
+    work: Floats
+    rests_soon: Integers  # 1 of those whose bounces end, and how long these take, s
+    rest_time: Floats
+    is_low: Integers  # 1 of those that are held, as they would be back at once
+    e_left: Floats  # restitution of those that still bounce, and in a round
+    e_now: Floats
+    taking: Integers  # (rounds, m) 1 of those that take part, with restitution; -1: slip is stopped
+    restitution: Floats
+    role: Integers  # of ``lift``: 1 of what it holds, 2 of what it lets not be less than ``least``
+    values: Floats
+    least: Floats
+    is_active: Integers
+    active: Integers
+    kept_way: Floats
     # of the set that is worked on
     closed: Integers
     group: Integers
@@ -113,26 +191,45 @@ class ContactArrays(Arrays):
     w: Floats
     order: Integers
     x: Floats
+    right: Floats  # right-hand sides
     direction: Floats  # (3,)
 
 
-def contact_arrays(m: int, rows: int, loads: int, given: dict[str, Any]) -> ContactArrays:
+#: Vectors of m numbers, and of m directions or points.
+WHOLE = (
+    "load_row", "load_count", "load_pushes", "touching", "begins", "leaves",
+    "jams", "closed", "group", "kept", "gone", "slides", "slipping", "mine", "before", "along_with",
+    "in_touch", "stops", "opening", "is_low", "rests_soon", "role", "is_active", "active",
+)  # fmt: skip
+NUMBERS = (
+    "load", "mode", "sizes", "closing", "limit", "was", "work", "rest_time", "e_left", "e_now",
+    "values", "least",
+)  # fmt: skip
+DIRECTIONS = (
+    "slip", "begin_way", "along", "way", "near", "force", "driven", "impulses", "kept_way"
+)  # fmt: skip
+
+
+def contact_arrays(
+    m: int, rows: int, loads: int, rounds: int, given: dict[str, Any]
+) -> ContactArrays:
     """Arrays of m contacts, beside so many rows of joints, with so many loads.
 
-    given: arrays of coefficients.
+    rounds: of an impact that are kept. given: arrays of coefficients, y and v among them.
     """
-    n = 3 * m
-    whole = ("newton", "alone", "load_row", "load_count", "load_pushes", "touching", "begins",
-             "leaves", "jams", "closed", "group", "kept", "gone", "slides", "slipping",
-             "mine", "before", "along_with")  # fmt: skip
+    n, size = 3 * m, len(given["v"])
+    longest = max(n, rows, size)
     arrays: dict[str, Any] = {
-        **{name: np.zeros(m, dtype=np.int64) for name in whole},
-        **{name: np.zeros(m) for name in ("load", "mode", "sizes")},
-        **{name: np.zeros((m, 3)) for name in (
-            "slip", "begin_way", "along", "way", "near", "force")},
-        **{name: np.zeros(n) for name in ("free", "inner", "rates", "x")},
+        **{name: np.zeros(m, dtype=np.int64) for name in WHOLE},
+        **{name: np.zeros(m) for name in NUMBERS},
+        **{name: np.zeros((m, 3)) for name in DIRECTIONS},
+        **{name: np.zeros(n) for name in ("free", "rates")},
         **{name: np.zeros((n, n)) for name in ("W", "B")},
-        **{name: np.zeros(n, dtype=np.int64) for name in ("rows", "order")},
+        **{name: np.zeros(longest) for name in ("inner", "x", "right")},
+        **{name: np.zeros(size) for name in ("v_before", "push", "moved")},
+        **{name: np.zeros(rows) for name in ("lam_free", "unit", "unit_of")},
+        **{name: np.zeros((rows, size)) for name in ("K", "answers")},
+        **{name: np.zeros((rows + n, size)) for name in ("J", "scaled")},
         **{name: np.zeros(loads) for name in ("loads", "given")},
         **{name: np.zeros((loads + 1, loads)) for name in ("taken", "rests")},
     }  # fmt: skip
@@ -141,11 +238,17 @@ def contact_arrays(m: int, rows: int, loads: int, given: dict[str, Any]) -> Cont
         **arrays,
         cone=cone_of(m),
         integer=np.zeros(len(ContactArrays.indices("integer")), dtype=np.int64),
-        holds=np.ones((m, 3), dtype=np.int64),
+        real=np.zeros(1),
+        placed=np.zeros_like(given["y"]),
+        moves=np.zeros((n, size)),
+        rows=np.zeros(n, dtype=np.int64),
+        order=np.zeros(longest, dtype=np.int64),
+        ended=np.zeros((m, 2), dtype=np.int64),
         feels=np.zeros((m, m), dtype=np.int64),
+        taking=np.zeros((rounds, m), dtype=np.int64),
+        restitution=np.zeros((rounds, m)),
         direction=np.zeros(3),
         frames=np.zeros((m, 3, 3)),
-        lam_free=np.zeros(rows),
         reaction=np.zeros((rows, n)),
-        w=np.zeros((3, n)),
+        w=np.zeros((3, longest)),
     )

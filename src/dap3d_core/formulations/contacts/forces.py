@@ -108,12 +108,13 @@ def add_sliding(s: ContactArrays) -> bool:
 
 
 @compiled
-def solve_forces(s: ContactArrays, part: float, tries: int) -> bool:
+def solve_forces(s: ContactArrays, part: float, tries: int, least: float = 0.0) -> bool:
     """Forces of closed contacts into ``cone.x``, which is where it begins, and ``rates``.
 
     False where there are none; of fewer tries than all that is left open.
 
     part: of the cones; contacts that are ``slipping`` have mu, not mu_s.
+    least: normal force of each, N.
     """
     n, cone = 3 * s.closed_count, s.cone
     cone.count = s.closed_count
@@ -132,6 +133,11 @@ def solve_forces(s: ContactArrays, part: float, tries: int) -> bool:
         mu = s.mu[c] if s.slipping[c] != 0 else s.mu_s[c]
         cone.mu[k] = 0.0 if s.slides[c] != 0 else part * mu
         cone.more[k], cone.gapless[k], cone.ratio[k] = s.load[c], s.gapless[c], s.ratio_s[c]
+        if least > 0.0 and s.alone[c] == 0:
+            for i in range(n):
+                cone.b[i] += least * cone.A[i, 3 * k]
+            cone.x[3 * k] -= least
+            cone.more[k] += least
     left = solve_cone(cone, tries)
     if left > UNSOLVED and tries == TRIES:
         for k in range(s.closed_count):
@@ -143,6 +149,8 @@ def solve_forces(s: ContactArrays, part: float, tries: int) -> bool:
             s.rates[i] += cone.A[i, k] * cone.x[k]
     for k in range(s.closed_count):
         c = s.closed[k]
+        if s.alone[c] == 0:
+            cone.x[3 * k] += least
         if s.slides[c] != 0:
             put_sliding_force(s, c, cone.x[3 * k : 3 * k + 3])
     return True

@@ -7,13 +7,22 @@ rounds: in each what approaches answers, all at once, so that impacts travel thr
 touch, as through Newton's cradle. Where e is zero everywhere one round of all that touch is enough.
 """
 
-import attrs
-import numpy as np
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
 
-from dap3d_core.formulations.contacts.contact_rows import ContactRows, ContactTable
-from dap3d_core.formulations.contacts.impulses import put_impulses, stop_slip
+from typing import Any
+
+from dap3d_core.assembly.arrays import System
+from dap3d_core.formulations.contacts.cone import TRIES, solve_cone
+from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
+from dap3d_core.formulations.contacts.forces import UNSOLVED, put_plain
+from dap3d_core.formulations.contacts.rows import change, kick, lift, put_free
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.linear.least_squares import factor_least, solve_least
 
+#: Part of the longest column below which slips depend on each other.
+DEPENDENT = 1e-12
 #: Normal speed, m/s of a scene of ordinary size, below which what touches does not approach.
 AT_REST = 1e-9
 #: Rounds of one instant; in the last one all that touches stops.
@@ -23,148 +32,234 @@ ROUNDS = 500
 LAST_HEIGHT = 1e-13
 
 
-#: Contacts that answer in a round, and coefficients of restitution of all; none where slip jammed.
-Round = tuple[list[int], Floats | None]
+@compiled
+def begin_problem(s: ContactArrays) -> None:
+    """The cone problem of the contacts that touch: from their slip on, with impulses zero."""
+    cone = s.cone
+    for k in range(s.touching_count):
+        s.closed[k] = s.touching[k]
+    s.closed_count = cone.count = s.touching_count
+    put_plain(s)
+    for k in range(s.closed_count):
+        c = s.closed[k]
+        cone.mu[k], cone.more[k] = s.mu[c], 0.0
+        cone.gapless[k], cone.ratio[k] = s.gapless[c], s.ratio[c]
+        for i in range(3):
+            cone.b[3 * k + i], cone.x[3 * k + i] = s.slip[c, i], 0.0
 
 
-@attrs.frozen
-class Impact:
-    """What impacts at one instant did.
-
-    Attributes:
-        impulses: (m, 3) in the frames of the contacts.
-        work: (m,) J, of the impulses of each contact and of drivers that these make work.
-        exchanged: J, sum of the magnitudes of its parts.
-        rest: contact -> s from now on until its bounces end.
-        rounds: the contacts of each, and the coefficients of restitution of all.
-        low: contacts that are held, as they would be back at once.
-    """
-
-    impulses: Floats
-    work: Floats
-    exchanged: float
-    rest: dict[int, float]
-    rounds: list[Round]
-    low: list[int]
-
-
-def repeat(table: ContactTable, rows: ContactRows, impact: Impact) -> Impact:
-    """The rounds of an impact once more, of the same contacts, from other velocities."""
-    work = 0.0
-    for taking, e in impact.rounds:
-        if e is None:
-            x = _stopping(rows, taking)
-        else:
-            x = _impulses(rows, taking, np.where(e > 0.0, table.e, 0.0))
-        x = np.zeros(3 * len(taking)) if x is None else x
-        before = rows.slip[taking] - rows.driven[taking]
-        rows.kick(_spread(x, taking, table.count))
-        after = rows.slip[taking] - rows.driven[taking]
-        work += float(np.sum(x.reshape(-1, 3) * 0.5 * (before + after)))
-    _hold_low(rows, impact.low, [])
-    return attrs.evolve(impact, work=np.array([work]))
+@compiled
+def put_impulses(s: ContactArrays, e: Floats) -> None:
+    """Impulses x (3 k,) of the contacts that touch, in both phases; e: (m,) of restitution."""
+    begin_problem(s)
+    cone, n, widens = s.cone, 3 * s.closed_count, False
+    for k in range(s.closed_count):
+        c = s.closed[k]
+        if s.newton[c] != 0:
+            cone.b[3 * k] += e[c] * min(s.slip[c, 0], 0.0)
+    solve_cone(cone, TRIES)
+    for k in range(n):
+        s.x[k] = cone.x[k]
+    for k in range(s.closed_count):
+        c = s.closed[k]
+        if s.newton[c] == 0:  # friction of joints alone has none
+            cone.more[k] = e[c] * s.x[3 * k]
+            s.x[3 * k] += cone.more[k]
+            widens |= cone.more[k] != 0.0
+    if not widens:
+        return
+    for i in range(n):
+        cone.x[i], cone.b[i] = 0.0, s.slip[s.closed[i // 3], i % 3]
+        for k in range(n):
+            cone.b[i] += cone.A[i, k] * s.x[k]
+    solve_cone(cone, TRIES)
+    for k in range(n):
+        s.x[k] += cone.x[k]
 
 
-def collide(table: ContactTable, rows: ContactRows, touching: list[int]) -> Impact:
-    """Let the contacts that touch collide until none approaches; velocities of ``rows`` follow."""
-    rounds: list[Round] = []
-    impulses, rest = np.zeros((table.count, 3)), dict[int, float]()
-    work, exchanged = np.zeros(table.count), 0.0
-    e = table.e.copy()
+@compiled
+def stop_slip(s: ContactArrays) -> bool:
+    """Impulses x (3 k,) that stop slip, of those that touch and do not approach; False if zero."""
+    begin_problem(s)
+    cone, n, pushes = s.cone, 3 * s.closed_count, False
+    for i in range(n):
+        s.x[i] = -cone.b[i]
+        for k in range(n):
+            s.B[i, k] = cone.A[i, k]
+    rank = factor_least(s.B, n, n, DEPENDENT, 0.0, s.w, s.order)
+    solve_least(s.B, n, n, rank, s.w, s.order, s.x, cone.x)
+    left = solve_cone(cone, TRIES)
+    for k in range(n):
+        s.x[k] = cone.x[k]
+    for k in range(s.closed_count):
+        pushes |= s.x[3 * k] > 0.0
+    return pushes and left <= UNSOLVED
+
+
+@compiled
+def collide(t: float, s: ContactArrays, system: System, loops: Any, functions: Any) -> None:
+    """Let the contacts in touch collide until none approaches; velocities follow."""
+    s.round_count, s.exchanged = 0, 0.0
+    for c in range(s.state.shape[0]):
+        s.e_left[c], s.work[c], s.rests_soon[c] = s.e[c], 0.0, 0
+        for i in range(3):
+            s.impulses[c, i] = 0.0
     for k in range(ROUNDS):
-        slip, closing = rows.slip, rows.closing
-        approach = [c for c in touching if closing[c] < -AT_REST * table.length[c]]
-        if not approach:
+        if not take_part(s, k == ROUNDS - 1):
             break
-        last = k == ROUNDS - 1
-        bounces = np.any(e[touching] > 0.0) and not last
-        taking = approach if bounces else touching
-        of = np.zeros_like(e) if last else e
-        x = _impulses(rows, taking, of)
-        short = _last_bounces(table, rows, taking, x, e)
-        if short:
-            rest |= short
-            e[list(short)] = 0.0
-            continue
-        rounds.append((taking, of.copy()))
-        parts = x.reshape(-1, 3) * 0.5 * (slip - rows.driven)[taking]
-        rows.kick(_spread(x, taking, table.count))
-        after = x.reshape(-1, 3) * 0.5 * (rows.slip - rows.driven)[taking]
-        work[taking] += np.sum(parts + after, axis=1)
-        exchanged += float(np.sum(np.abs(parts)) + np.sum(np.abs(after)))
-        impulses[taking] += x.reshape(-1, 3)
-    low = _stop_low_rocking(table, rows, touching)
-    return Impact(impulses, work, exchanged, rest, rounds, low)
+        put_impulses(s, s.e_now)
+        if not end_bounces(t, s, system, loops, functions):
+            remember_round(s)
+            act(s, system)
+    stop_low_rocking(t, s, system, loops, functions)
 
 
-def unjam(
-    table: ContactTable, rows: ContactRows, touching: list[int], impact: Impact
-) -> Impact | None:
-    """Stop slip that jams behind an impact, by an impulse without a collision; None if none does.
+@compiled
+def take_part(s: ContactArrays, is_last: bool) -> bool:
+    """Let ``touching`` be those that answer in a round, by ``e_now``; False if none approaches."""
+    s.touching_count, bounces = 0, False
+    for k in range(s.in_touch_count):
+        c = s.in_touch[k]
+        bounces |= s.e_left[c] > 0.0
+        if s.closing[c] < -AT_REST * s.length[c]:
+            s.touching[s.touching_count] = c
+            s.touching_count += 1
+    if s.touching_count > 0 and (is_last or not bounces):
+        for k in range(s.in_touch_count):
+            s.touching[k] = s.in_touch[k]
+        s.touching_count = s.in_touch_count
+    for c in range(s.state.shape[0]):
+        s.e_now[c] = 0.0 if is_last else s.e_left[c]
+    return s.touching_count > 0
+
+
+@compiled
+def end_bounces(t: float, s: ContactArrays, system: System, loops: Any, functions: Any) -> bool:
+    """Let contacts whose bounces would be too low from here on bounce no more; True if some do.
+
+    The speeds after bounces are v, e v, e^2 v, ...: how long that takes is the sum of a series.
+    """
+    found = False
+    for k in range(s.touching_count):
+        c = s.touching[k]
+        if not (s.e_left[c] > 0.0 and s.slip[c, 0] < 0.0):
+            continue  # it is at rest
+        put_free(t, s, system, loops, functions)
+        v, a = s.slip[c, 0], -s.free[3 * c]
+        for q in range(s.touching_count):
+            for i in range(3):
+                v += s.W[3 * c, 3 * s.touching[q] + i] * s.x[3 * q + i]
+        is_low = a > 0.0 and v * v > 0.0 and v * v < 2.0 * a * LAST_HEIGHT * s.length[c]
+        if is_low and s.e_left[c] < 1.0:
+            s.rest_time[c] = 2.0 * v / (a * (1.0 - s.e_left[c]))
+            s.rests_soon[c], found = 2, True
+    for c in range(s.state.shape[0]):
+        if s.rests_soon[c] == 2:
+            s.e_left[c], s.rests_soon[c] = 0.0, 1
+    return found
+
+
+@compiled
+def remember_round(s: ContactArrays) -> None:
+    """Keep who took part in a round, as far as there is room, for the same once more."""
+    if s.round_count < s.taking.shape[0]:
+        for c in range(s.state.shape[0]):
+            s.taking[s.round_count, c], s.restitution[s.round_count, c] = 0, s.e_now[c]
+        for k in range(s.touching_count):
+            s.taking[s.round_count, s.touching[k]] = 1
+        s.round_count += 1
+
+
+@compiled
+def act(s: ContactArrays, system: System) -> None:
+    """Let impulses x act, and count them and their work."""
+    for k in range(s.touching_count):
+        count_work(s, k)
+    kick(s, system)
+    for k in range(s.touching_count):
+        count_work(s, k)
+        for i in range(3):
+            s.impulses[s.touching[k], i] += s.x[3 * k + i]
+
+
+@compiled
+def count_work(s: ContactArrays, k: int) -> None:
+    """Count half of the work of impulses along the present slip."""
+    c = s.touching[k]
+    for i in range(3):
+        part = s.x[3 * k + i] * 0.5 * (s.slip[c, i] - s.driven[c, i])
+        s.work[c] += part
+        s.exchanged += abs(part)
+
+
+@compiled
+def unjam(s: ContactArrays, system: System) -> bool:
+    """Stop slip that jams behind an impact, by an impulse without a collision; False if none does.
 
     While it slips its friction presses bodies together, however short the time: an impulse, until
     it sticks; then that turns what approaches back (Genot, Brogliato, Eur. J. Mech. A 18 (1999)
     653). So what holds is at rest then, and nothing bounces.
     """
-    closed = [c for c in touching if rows.closing[c] < AT_REST * table.length[c]]
-    x = _stopping(rows, closed)
-    if x is None:
-        return None
-    parts, before = x.reshape(-1, 3), (rows.slip - rows.driven)[closed]
-    rows.kick(_spread(x, closed, table.count))
-    shares = parts * 0.5 * np.stack([before, (rows.slip - rows.driven)[closed]])
-    work, impulses = impact.work.copy(), impact.impulses.copy()
-    work[closed] += shares.sum(axis=(0, 2))
-    impulses[closed] += parts
-    exchanged = impact.exchanged + float(np.abs(shares).sum())
-    rounds = [*impact.rounds, (closed, None)]
-    return Impact(impulses, work, exchanged, impact.rest, rounds, impact.low)
+    s.touching_count = 0
+    for k in range(s.in_touch_count):
+        c = s.in_touch[k]
+        if s.closing[c] < AT_REST * s.length[c]:
+            s.touching[s.touching_count] = c
+            s.touching_count += 1
+    if not stop_slip(s):
+        return False
+    for c in range(s.state.shape[0]):
+        s.e_now[c] = -1.0
+    remember_round(s)
+    act(s, system)
+    return True
 
 
-def _stopping(rows: ContactRows, closed: list[int]) -> Floats | None:
-    """(3 k,) impulses that stop slip, of contacts that do not approach; None but zero."""
-    s = rows.put(closed)
-    return s.x[: 3 * len(closed)].copy() if stop_slip(s) else None
+@compiled
+def stop_low_rocking(
+    t: float, s: ContactArrays, system: System, loops: Any, functions: Any
+) -> None:
+    """Hold what would be back from a height too low to tell from rest, as of rocking."""
+    for c in range(s.state.shape[0]):
+        s.is_low[c] = s.role[c] = 0
+    for k in range(s.in_touch_count):
+        c = s.in_touch[k]
+        v = s.closing[c]
+        s.role[c] = 2
+        if v > AT_REST * s.length[c]:
+            put_free(t, s, system, loops, functions)
+            if v * v < -2.0 * LAST_HEIGHT * s.length[c] * s.free[3 * c]:
+                s.is_low[c] = s.role[c] = 1
+    hold_low(s, system)
 
 
-def _stop_low_rocking(table: ContactTable, rows: ContactRows, touching: list[int]) -> list[int]:
-    """Hold what would be back from a height too low to tell from rest, as of rocking: which."""
-    v, a = rows.closing, -rows.free[::3]
-    limit = 2.0 * LAST_HEIGHT * table.length * a
-    low = [c for c in touching if v[c] > AT_REST * table.length[c] and v[c] ** 2 < limit[c]]
-    _hold_low(rows, low, [c for c in touching if c not in low])
-    return low
+@compiled
+def hold_low(s: ContactArrays, system: System) -> None:
+    """Stop the contacts of role 1, if there are any, so that none of role 2 approaches."""
+    found = 0
+    for c in range(s.state.shape[0]):
+        found |= s.role[c] == 1
+        s.values[c], s.least[c] = s.closing[c], 0.0
+    if found != 0:
+        lift(s)
+        change(s, system)
 
 
-def _hold_low(rows: ContactRows, low: list[int], others: list[int]) -> None:
-    if low:
-        rows.change(rows.lifted(rows.closing, low, others))
-
-
-def _spread(x: Floats, contacts: list[int], count: int) -> Floats:
-    every = np.zeros((count, 3))
-    every[contacts] = x.reshape(-1, 3)
-    return every.ravel()
-
-
-def _impulses(rows: ContactRows, contacts: list[int], e: Floats) -> Floats:
-    """(3 k,) impulses of one round."""
-    s = rows.put(contacts)
-    put_impulses(s, e)
-    return s.x[: 3 * len(contacts)].copy()
-
-
-def _last_bounces(
-    table: ContactTable, rows: ContactRows, contacts: list[int], x: Floats, e: Floats
-) -> dict[int, float]:
-    """Contacts whose bounces would be too low from here on -> how long these would take, s."""
-    which = rows.rows_of(contacts)
-    after = (rows.W[np.ix_(which, which)] @ x)[::3] + rows.slip[contacts, 0]
-    found = {}
-    for c, v in zip(contacts, after, strict=True):
-        a = -float(rows.free[3 * c])
-        low = 0.0 < v * v < 2.0 * a * LAST_HEIGHT * table.length[c] if a > 0.0 else False
-        if e[c] > 0.0 and low and rows.slip[c, 0] < 0.0:
-            # what has come to rest before: the speeds after bounces are v, e v, e^2 v, ...
-            found[c] = 2.0 * float(v) / (a * (1.0 - float(e[c]))) if e[c] < 1.0 else np.inf
-    return {c: t for c, t in found.items() if np.isfinite(t)}
+@compiled
+def repeat_rounds(s: ContactArrays, system: System) -> None:
+    """The rounds that are kept once more, of the same contacts, from other velocities."""
+    for c in range(s.state.shape[0]):
+        s.work[c], s.role[c] = 0.0, s.is_low[c]
+    for q in range(s.round_count):
+        s.touching_count = 0
+        for c in range(s.state.shape[0]):
+            s.e_now[c] = s.e[c] if s.restitution[q, c] > 0.0 else 0.0
+            if s.taking[q, c] != 0:
+                s.touching[s.touching_count] = c
+                s.touching_count += 1
+        if s.restitution[q, 0] >= 0.0:
+            put_impulses(s, s.e_now)
+            act(s, system)
+        elif stop_slip(s):
+            act(s, system)
+    hold_low(s, system)

@@ -15,8 +15,11 @@ DEPENDENT = 1e-12
 HELD, OF_REST, RATE_ROUNDING = 1e-9, 0.05, 1e-13
 #: How many parts of their cones within which contacts that share what they carry may be to stay,
 #: each leaving half of what the one before leaves: what they carry reaches its limit with so much
-#: left, 1e-9.
+#: left, 1e-9. And how many normal forces, each half of the one before.
 PARTS = 30
+#: Normal force that each of them has, as a part of an equal share, where it can: what carried
+#: nothing would be at its limit at once.
+LEAST = 0.2
 #: Tries of a cone problem that may have no solution.
 FEW = 3
 
@@ -50,12 +53,12 @@ def put_own_rows(s: ContactArrays) -> int:
 
 
 @compiled
-def part_of_cones(k: int) -> float:
-    """The part of their cones of a number."""
+def left_of(k: int) -> float:
+    """What the part of their cones of a number leaves."""
     left = 1.0
     for _ in range(k + 1):
         left *= 0.5
-    return 1.0 - left
+    return left
 
 
 @compiled
@@ -65,35 +68,52 @@ def hold_inside(s: ContactArrays) -> bool:
         s.cone.x[k] = 0.0
     for k in range(s.closed_count):
         s.slipping[s.closed[k]] = 0
-    if are_held_within(s, 0):  # as a rule
+    if are_held_within(s, 0, 0):  # as a rule
         return True
     for k in range(3 * s.closed_count):
         s.cone.x[k] = 0.0
-    if not are_held_within(s, PARTS - 1):
+    if not are_held_within(s, PARTS - 1, PARTS - 1):
         return False
-    low, high = 1, PARTS - 2
-    while low <= high:  # what one part allows, so does every larger one
-        k = (low + high) // 2
-        for q in range(3 * s.closed_count):
-            s.cone.x[q] = s.inner[q]
-        if are_held_within(s, k):
-            high = k - 1
-        else:
-            low = k + 1
+    part = bring_in(s, -1)
+    bring_in(s, min(part + 1, PARTS - 1))
     return True
 
 
 @compiled
-def are_held_within(s: ContactArrays, part: int) -> bool:
-    """True if forces within a part of the cones hold; these are ``inner`` then."""
-    solve_forces(s, part_of_cones(part), FEW)
+def bring_in(s: ContactArrays, part: int) -> int:
+    """The first part of the cones that holds; or, within one, the first normal force that does."""
+    low, high = 0, PARTS - 2
+    while low <= high:  # what one allows, so does every later one
+        k = (low + high) // 2
+        for q in range(3 * s.closed_count):
+            s.cone.x[q] = s.inner[q]
+        if are_held_within(s, k if part < 0 else part, PARTS - 1 if part < 0 else k):
+            high = k - 1
+        else:
+            low = k + 1
+    return low
+
+
+@compiled
+def are_held_within(s: ContactArrays, part: int, least: int) -> bool:
+    """True if forces within a part of the cones hold; these are ``inner`` then.
+
+    least: the number of the normal force that each has at least.
+    """
+    load, count, left = 0.0, 0, left_of(part)
+    for k in range(s.closed_count):
+        c = s.closed[k]
+        if s.alone[c] == 0:
+            load, count = max(load, -s.free[3 * c] / s.cone.A[3 * k, 3 * k]), count + 1
+    normal = LEAST * left_of(least) * load / count if count > 1 else 0.0
+    solve_forces(s, 1.0 - left, FEW, normal)
     x, A, big = s.cone.x, s.cone.A, put_sizes(s, True)
     for q in range(put_own_rows(s)):
         k = s.rows[q] // 3
         c = s.closed[k]
         own = max(A[3 * k, 3 * k], A[3 * k + 1, 3 * k + 1], A[3 * k + 2, 3 * k + 2])
         carried = s.mu_s[c] * (x[3 * k] + s.load[c])
-        rest = OF_REST * (1.0 - part_of_cones(part)) * own * carried + RATE_ROUNDING * big
+        rest = OF_REST * left * own * carried + RATE_ROUNDING * big
         if not abs(s.rates[s.rows[q]]) <= min(HELD * s.sizes[k], rest):
             return False
     for k in range(3 * s.closed_count):

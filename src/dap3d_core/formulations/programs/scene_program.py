@@ -324,7 +324,9 @@ def write_programs(
             break
     declared = [f"declare void @{symbol}({ARGUMENTS})" for symbol in general.values()]
     text = "\n".join([*needs.values(), *declared, *texts, _WEIGHTS])
-    return text if count == 1 else differentiate(text, count), written
+    if count > 1:
+        text = differentiate(text, count, is_fused=objects.has_fused_operations())
+    return text, written
 
 
 def _rates_head(evaluator: Evaluator, rhs: str) -> str:

@@ -12,7 +12,7 @@ from dap3d_core.assembly.collisions.placed_shapes import (
     placed_shapes,
     with_room,
 )
-from dap3d_core.formulations.contacts.contact_rows import ContactTable
+from dap3d_core.formulations.contacts.contact_table import ContactTable
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.contacts.contact import RESISTED
 from dap3d_core.kernels.array_types import Floats, Integers
@@ -101,6 +101,7 @@ class StepArrays(Arrays):
     first_v_dot = _integer()  # places in reported rows
     first_lam = _integer()
     first_state = _integer()
+    is_steady = _integer()  # 1 where contacts push as in the last step, and hit nothing
     t1 = _real()  # s, end of the step, and its length
     h = _real()
     residual = _real()
@@ -265,13 +266,19 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
 
 
 def _put_carried(s: StepArrays) -> None:
-    """Put what joints hold at bodies that are far lighter: stand-in links, feet with a rotor."""
+    """Put what joints hold at bodies that are far lighter: stand-in links, feet with a rotor.
+
+    Through light ones, too: joints in a row, and wheels of a sum, hold light bodies at light ones.
+    """
     own = np.array([s.mass, np.linalg.eigvalsh(s.Jp.reshape(-1, 3, 3))[:, -1]]).T
-    carried = own.copy()
-    for first, last in itertools.pairwise(s.row_start):
-        bodies = s.row_body[first:last]
-        carried[bodies] = np.maximum(carried[bodies], own[bodies].max(axis=0))
-    light = (own < LIGHT * carried).any(axis=1)
+    carried, passed = own, None
+    while passed is None or not np.array_equal(carried, passed):
+        light = (own < LIGHT * carried).any(axis=1)
+        passed, felt = carried, np.where(light[:, None], carried, own)
+        carried = felt.copy()
+        for first, last in itertools.pairwise(s.row_start):
+            bodies = s.row_body[first:last]
+            carried[bodies] = np.maximum(carried[bodies], felt[bodies].max(axis=0))
     s.carried[light], s.light_count = 1.0 / carried[light], int(light.sum())
 
 

@@ -28,10 +28,7 @@ PART, MOST_PARTS, RATE_PASSES, RATE_CHANGE = 0.25, 1000, 8, 1e-7
 def move_freely(work: Any, s: StepArrays, rhs: Function, system: System, loops: Any) -> None:
     """Put the state at the end of the step with the last accelerations, as the trial state."""
     t, y, free, size = work.t, work.state[Y], work.state[TRIAL], work.state.shape[1]
-    slope, middle = s.slopes[:size], s.slopes[size:]
-    wanted, parts = s.h * work.rate / PART, 1
-    if wanted > 1.0:
-        parts = math.ceil(min(wanted, MOST_PARTS * s.h / work.fixed_step))
+    slope, middle, parts = s.slopes[:size], s.slopes[size:], parts_of(work, s)
     copy(free, y)
     h = s.h / parts
     for k in range(s.y_free.size):
@@ -51,6 +48,54 @@ def move_freely(work: Any, s: StepArrays, rhs: Function, system: System, loops: 
         for b in range(1, s.mass.size):
             normalise(free, coordinate_offset(b) + 3)
         work.rhs_count += 2
+
+
+@compiled
+def parts_of(work: Any, s: StepArrays) -> int:
+    """In how many parts a step follows the forces."""
+    wanted = s.h * work.rate / PART
+    return math.ceil(min(wanted, MOST_PARTS * s.h / work.fixed_step)) if wanted > 1.0 else 1
+
+
+@compiled
+def follow_states(work: Any, s: StepArrays, rhs: Function, system: System, loops: Any) -> None:
+    """Integrate the states of elements again, along the way that bodies went as contacts began.
+
+    A state that sums up, as a length that counts turns, would keep the way of free motion for good.
+    """
+    y, trial, size, n = work.state[Y], work.state[TRIAL], work.state.shape[1], s.mass.size - 1
+    slope, middle, parts = s.slopes[:size], s.slopes[size:], parts_of(work, s)
+    first = s.first_state - 1
+    for i in range(first, size - 1):
+        trial[i] = y[i]
+    for k in range(2 * parts):  # to the middle of each part, and to its end
+        place = (2 * (k // 2) + 1) / (2.0 * parts) if k % 2 else (k // 2) / parts
+        for i in range(size):
+            middle[i] = y[i] + place * (trial[i] - y[i])
+        for i in range(first, size - 1):
+            middle[i] = trial[i] + (0.5 * s.h / parts * slope[i] if k % 2 else 0.0)
+        for b in range(1, n + 1):
+            normalise(middle, coordinate_offset(b) + 3)
+            put_mean_rates(y, trial, coordinate_offset(b), s.h, middle[velocity_offset(b, n) :])
+        rhs(work.t + place * s.h, middle, slope, system, loops)
+        for i in range(first, size - 1 if k % 2 else first):
+            trial[i] += s.h / parts * slope[i]
+    work.rhs_count += 2 * parts
+
+
+@compiled
+def put_mean_rates(y: Floats, z: Floats, c: int, h: float, rates: Floats) -> None:
+    """Put velocity and angular velocity, body axes, with which a body goes from y to z in h."""
+    for k in range(3):
+        rates[k] = (z[c + k] - y[c + k]) / h
+    e, a, b, d = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
+    f, p, q, r = z[c + 3], z[c + 4], z[c + 5], z[c + 6]
+    turn, x = e * f + a * p + b * q + d * r, e * p - a * f - b * r + d * q
+    v, w = e * q - b * f - d * p + a * r, e * r - d * f - a * q + b * p
+    size = math.sqrt(x * x + v * v + w * w)
+    part = 2.0 * math.atan2(size, abs(turn)) / (h * size) if size > 0.0 else 0.0
+    part = -part if turn < 0.0 else part
+    rates[3], rates[4], rates[5] = part * x, part * v, part * w
 
 
 @compiled

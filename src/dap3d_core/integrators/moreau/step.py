@@ -15,7 +15,7 @@ from dap3d_core.integrators.moreau.contact_set import (
     find_grips,
     velocity_of,
 )
-from dap3d_core.integrators.moreau.free_motion import largest_rate, move_freely
+from dap3d_core.integrators.moreau.free_motion import follow_states, largest_rate, move_freely
 from dap3d_core.integrators.moreau.groups import find_groups, root_of
 from dap3d_core.integrators.moreau.impulses import (
     complete_row,
@@ -198,8 +198,10 @@ def way_of(work: Any, s: StepArrays, b: int, k: int) -> float:
 @compiled
 def keep_pushed(work: Any, s: StepArrays) -> None:
     """Keep the accelerations that contacts have given; those of impacts do not go on."""
+    s.is_steady = 1 if work.pushed[0, 0] != 0.0 else 0
     work.pushed[0, 0] = 0.0
     for b in range(1, s.end.shape[0]):
+        s.is_steady = 0 if s.hit[b] != NOT_HIT else s.is_steady
         for k in range(6):
             change = s.end[b, k] - s.free[b, k] if s.hit[b] == NOT_HIT else 0.0
             work.pushed[b, k] = change / s.h
@@ -394,6 +396,8 @@ def part(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
 def finish(work: Any, s: StepArrays, functions: Any, system: System, loops: Any) -> None:
     """Make the trial state that of the end of the step."""
     y, trial, n = work.state[Y], work.state[TRIAL], s.mass.size - 1
+    if s.is_solved != 0 and s.is_steady == 0 and s.first_state < y.size:
+        follow_states(work, s, functions[0], system, loops)
     for b in range(1, n + 1 if s.is_solved != 0 else 1):
         f, end = velocity_offset(b, n), s.end[b]
         a, c, d = axes_of(trial[coordinate_offset(b) :], 0)

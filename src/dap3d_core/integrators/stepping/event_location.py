@@ -229,18 +229,20 @@ def cubic_minimum(a: float, b: float, c: float, d: float) -> float:
     1 where there is none, or where it is clear of zero: by more than a cubic errs, which is a part
     of the drop to it from the nearer end.
     """
-    if not b < 0.0 < d:
+    if not d > 0.0:
         return 1.0
     rise = c - a
     p2, p3 = 3.0 * rise - 2.0 * b - d, b + d - 2.0 * rise
     inside = p2 * p2 - 3.0 * p3 * b
-    if inside < 0.0 or p2 + math.sqrt(inside) <= 0.0:
+    root, x = math.sqrt(max(inside, 0.0)), 1.0
+    if p2 < 0.0 and p3 > 0.0:
+        x = (root - p2) / (3.0 * p3)
+    elif p2 >= 0.0 and b < 0.0:
+        x = -b / (p2 + root)
+    if inside < 0.0 or not 0.0 < x < 1.0:
         return 1.0
-    x = -b / (p2 + math.sqrt(inside))
     low = a + x * (b + x * (p2 + x * p3))
-    if not 0.0 < x < 1.0 or low >= CUBIC_ERROR * (min(a, c) - low):
-        return 1.0
-    return x
+    return 1.0 if low >= CUBIC_ERROR * (min(a, c) - low) else x
 
 
 @compiled

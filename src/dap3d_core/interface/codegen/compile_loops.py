@@ -106,8 +106,8 @@ def _compiled_loop(type_info: TypeInfo, what: str, announce: Callable[[str], Non
             raise
         raise PluginError(
             f"{where_is(type_info.type)}: its kernels cannot be compiled ({loop.name}): {error}. "
-            "A kernel is plain: tuples of numbers, the words of dap3d_core.kernels, where() for "
-            "branches"
+            "A kernel is plain: tuples of numbers, the functions of dap3d_core.kernels, where() "
+            "for branches"
         ) from error
 
 

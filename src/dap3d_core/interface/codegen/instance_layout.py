@@ -4,7 +4,7 @@ Kernels may omit brackets around a single entry: a joint of one row may return a
 an element of one body its pair or block. ``entries`` gives the expression of each number.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from inspect import signature
 from itertools import takewhile
 from math import prod
@@ -194,12 +194,13 @@ def entries(value: Any, shape: tuple[int, ...], what: str, name: str = "out") ->
     return _paths(actual, name)
 
 
-def state_entries(value: Any, shapes: Sequence[tuple[int, ...]]) -> list[str]:
-    """As ``entries``, of what ``rate`` returns: the derivative of each state, in their order.
+def state_entries(value: Any, type_: type[TypeBase]) -> list[str]:
+    """As ``entries``, of what ``rate`` of a type returns: the derivative of each of its states.
 
     Raises:
         ShapeError: the value has another shape.
     """
+    shapes = [shape for _, shape in state_places(type_).values()]
     what = f"{sum(map(size, shapes))} numbers, the derivatives of its states"
     if len(shapes) == 1:
         return entries(value, shapes[0], what)

@@ -18,7 +18,7 @@ WORDS = ("sin", "cos", "tan", "sinh", "cosh", "tanh", "atan", "atan2", "exp", "l
 
 
 class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
-    """Prints expressions in the words of kernels; ``used`` collects these."""
+    """Prints expressions in the functions of kernels; ``used`` collects these."""
 
     def __init__(self) -> None:
         super().__init__({"fully_qualified_modules": False, "strict": False})

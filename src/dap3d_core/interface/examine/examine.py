@@ -24,7 +24,6 @@ from dap3d_core.interface.codegen.instance_layout import (
     layout_of,
     size,
     state_entries,
-    state_places,
     value_at,
 )
 from dap3d_core.interface.codegen.kernel_arguments import (
@@ -40,9 +39,10 @@ from dap3d_core.interface.codegen.kernel_arguments import (
 from dap3d_core.interface.codegen.loop_source import JUMP_KINDS, jump_names, row_count
 from dap3d_core.interface.codegen.reactions import READING, reaction_names
 from dap3d_core.interface.codegen.type_info import TypeInfo
+from dap3d_core.interface.contacts.contact import DECLARED
 from dap3d_core.interface.derive.derive import CannotDeriveError, derive, missing
 from dap3d_core.interface.element_states import unknown_names
-from dap3d_core.interface.errors import PluginError, line_of, no_field, where_is
+from dap3d_core.interface.errors import PluginError, line_of, name_hint, no_field, where_is
 from dap3d_core.interface.examine.random_values import (
     numbers,
     random_field,
@@ -159,7 +159,7 @@ def _output(
         try:
             value = kernel(*(random_quantity(q, rng) for q in quantities))
             if kernel_name in ("rate", "reset"):
-                paths = state_entries(value, [s for _, s in state_places(type_).values()])
+                paths = state_entries(value, type_)
             else:
                 paths = entries(value, *_expected(type_, kernel_name, value, rows))
         except ShapeError as error:
@@ -318,7 +318,7 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
     who, kind = where_is(type_), type_.kind
     if not type_.keyword:
         example = f'keyword = "{type_.__name__.lower()}"'
-        raise PluginError(f"{who} has no keyword; add e.g. {example}, without a type behind it")
+        raise PluginError(f"{who} has no keyword; add e.g. {example}, without an annotation")
     for field in attrs.fields(type_):  # type: ignore[arg-type]
         if "dap3d" not in field.metadata and field.default is attrs.NOTHING:
             raise PluginError(f"{who}: {no_field(type_, field.name)}")
@@ -346,7 +346,9 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
     _check_members(type_)
     for name in needed:
         if name not in kernels:
-            raise PluginError(f"{who} does not define {name}, which every {kind} of its rows needs")
+            if type_.is_contact:
+                name = " and ".join(one for one in DECLARED if getattr(type_, one, None) is None)
+            raise PluginError(f"{who} does not define {name}")
 
 
 def _check_rows(type_: type[Joint]) -> None:
@@ -418,9 +420,7 @@ def _check_names(
     who = f"{where_is(type_)}.{kernel}"
     for name in wanted:
         if name not in names:
-            near, declared = get_close_matches(name, names, 1), no_field(type_, name)
-            hint = f"did you mean {near[0]}? " if near else ""
-            hint = f"{declared}; " if declared else hint
+            hint = name_hint(type_, name, names)
             if name in reaction_names(type_):
                 hint = f"reactions are known to {' and '.join(READING)} alone; "
             raise PluginError(
@@ -495,5 +495,5 @@ def _expected(
     if kernel in ("C", "C_dot"):
         level = "position" if kernel == "C" else "velocity"
         n = len(type_.position_rows() if kernel == "C" else type_.velocity_rows())
-        return (n,), f"{n} numbers, one for each row of the {level} level"
-    return (type_.rows,), f"{type_.rows} numbers, one for each row"
+        return (n,), f"{n} number{'s' * (n != 1)}, one for each row of the {level} level"
+    return (type_.rows,), f"{type_.rows} number{'s' * (type_.rows != 1)}, one for each row"

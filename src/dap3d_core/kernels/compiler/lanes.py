@@ -69,14 +69,6 @@ class VectorWriter:
         vectors = _DOUBLE.sub(self.vector, NUMBER.sub(lambda n: self.constant(n[0]), text))
         return vectors.replace("DOUBLE", "double")
 
-    def splat(self, name: str, word: str) -> list[str]:
-        """A number in all lanes."""
-        zeros = f"<{self.count} x i32> zeroinitializer"
-        return [
-            f"  {name}.2 = insertelement {self.vector} undef, double {word}, i32 0",
-            f"  {name} = shufflevector {self.vector} {name}.2, {self.vector} undef, {zeros}",
-        ]
-
 
 def rewritten(text: str, writer: Callable[[set[str]], VectorWriter]) -> Iterator[str]:
     """The lines of a module, those of its functions rewritten.
@@ -138,8 +130,16 @@ class _Widener(VectorWriter):
             operation, kind, word = found.groups()
             if word in self._conditions:
                 return [f"  {name} = {operation} {self._mask} {word} to {self.vector}"]
-            return [f"  {name}.1 = {text}", *self.splat(name, f"{name}.1")]
+            return [f"  {name}.1 = {text}", *self._splat(name, f"{name}.1")]
         return None
+
+    def _splat(self, name: str, word: str) -> list[str]:
+        """A number in all lanes."""
+        zeros = f"<{self.count} x i32> zeroinitializer"
+        return [
+            f"  {name}.2 = insertelement {self.vector} undef, double {word}, i32 0",
+            f"  {name} = shufflevector {self.vector} {name}.2, {self.vector} undef, {zeros}",
+        ]
 
     def _condition(self, word: str) -> str:
         """A condition of numbers, or a constant, for all lanes."""

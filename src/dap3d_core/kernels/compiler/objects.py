@@ -68,6 +68,12 @@ def processor() -> Processor:
     return Processor(llvm.get_process_triple(), name or llvm.get_host_cpu_name(), features)
 
 
+@cache
+def has_fused_operations() -> bool:
+    """True if the processor multiplies and adds at once, with one rounding."""
+    return processor().triple.startswith("aarch64") or "+fma" in processor().features.split(",")
+
+
 #: Compiles a function for the processor that it is given.
 _TRIAL = """
 import sys
@@ -111,7 +117,7 @@ def initialise_all_targets() -> None:
 @cache
 def compiler() -> str:
     """Digest of this compiler's sources."""
-    files = sorted(Path(__file__).parent.glob("*.py"))
+    files = sorted(Path(__file__).parent.rglob("*.py"))
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 

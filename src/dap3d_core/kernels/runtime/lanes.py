@@ -27,7 +27,7 @@ from dap3d_core.kernels.runtime.source_digest import origin
 
 #: Numbers at whose multiples arrays begin: those of a register of the widest vectors.
 ALIGNMENT = 8
-#: Of each array that owns its memory: itself, and the numbers of all lanes.
+#: Of each array that owns its memory: its numbers, and those of all lanes.
 Buffers = dict[int, tuple[Floats, Floats]]
 _units: dict[str, Unit] = {}
 _making = threading.Lock()
@@ -93,7 +93,8 @@ def differentiated(entry: Entry, count: int) -> Entry:
         return entry
 
     def write(symbols: list[str]) -> tuple[str, list[Any]]:
-        return differentiate(unit.fresh_text(symbols), count), unit.results
+        text, is_fused = unit.fresh_text(symbols), objects.has_fused_operations()
+        return differentiate(text, count, is_fused=is_fused), unit.results
 
     wide = unit_of(f"{unit.name}-d{count}", len(unit.symbols), write)
     wide.has_slopes = True
@@ -168,15 +169,16 @@ class WideArrays:
             numbers = np.zeros(whole.nbytes // 8 * self._count + ALIGNMENT)
             first = -address_of(numbers) // 8 % ALIGNMENT
             end = first + whole.nbytes // 8 * self._count
-            self._buffers[id(whole)] = whole, numbers[first:end].reshape(-1, self._count)
+            flat = whole.reshape(-1).view(np.float64)
+            self._buffers[id(whole)] = flat, numbers[first:end].reshape(-1, self._count)
         wide = self._buffers[id(whole)][1]
         first = (address_of(array) - address_of(whole)) // 8 if array.size else 0
         return wide[first : first + array.nbytes // 8]
 
     def spread(self) -> None:
         """Give each scene the numbers of the one."""
-        for whole, wide in self._buffers.values():
-            wide[:] = whole.reshape(-1, 1)
+        for flat, wide in self._buffers.values():
+            wide[:] = flat.reshape(-1, 1)
 
 
 class DifferentiatedArrays(WideArrays):
@@ -196,8 +198,8 @@ class DifferentiatedArrays(WideArrays):
         known = len(self._buffers)
         matrix = super().matrix(array)
         if len(self._buffers) > known:
-            whole, wide = list(self._buffers.values())[-1]
-            wide[:, 0] = _flat(whole)
+            flat, wide = list(self._buffers.values())[-1]
+            wide[:, 0] = flat
         return matrix
 
     def _is_own(self, name: str, names: Collection[str]) -> bool:
@@ -205,16 +207,22 @@ class DifferentiatedArrays(WideArrays):
 
     def take(self) -> None:
         """Take over numbers that Python has changed: their slopes become zero."""
-        for whole, wide in self._buffers.values():
-            flat = _flat(whole)
-            changed = flat.view(np.int64) != np.ascontiguousarray(wide[:, 0]).view(np.int64)
-            wide[changed] = 0.0
-            wide[changed, 0] = flat[changed]
+        pairs = list(self._buffers.values())
+        present = np.concatenate([flat for flat, _ in pairs])
+        before = np.concatenate([wide[:, 0] for _, wide in pairs])
+        changed = np.flatnonzero(present.view(np.int64) != before.view(np.int64))
+        ends = np.cumsum([flat.size for flat, _ in pairs])
+        cuts = [0, *np.searchsorted(changed, ends).tolist()]
+        for (flat, wide), one, end, first in zip(pairs, cuts, cuts[1:], ends, strict=False):
+            if one < end:
+                places = changed[one:end] - first  # from the end
+                wide[places] = 0.0
+                wide[places, 0] = flat[places]
 
     def give(self) -> None:
         """Give Python the numbers."""
-        for whole, wide in self._buffers.values():
-            _flat(whole)[:] = wide[:, 0]
+        for flat, wide in self._buffers.values():
+            flat[:] = wide[:, 0]
 
     def slopes(self, array: Floats) -> Floats:
         """(size, count - 1) view of the slopes of an array."""
@@ -275,7 +283,3 @@ class Differentiation:
         self._any.give()
         entry(*(plain[address] for address in addresses))
         self.take()
-
-
-def _flat(array: Floats) -> Floats:
-    return array.reshape(-1).view(np.float64)

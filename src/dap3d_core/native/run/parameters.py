@@ -16,7 +16,7 @@ from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.native.run.outputs import Outputs, outputs_of
-from dap3d_core.native.run.prepared import PreparedRun, refusal
+from dap3d_core.native.run.prepared import ContactCode, PreparedRun, refusal
 from dap3d_core.scene import SceneError
 from dap3d_core.study.batch import initial_state
 from dap3d_core.study.parameters import SceneParameter, with_values
@@ -148,6 +148,10 @@ def _numbers(prepared: PreparedRun) -> Iterator[tuple[str, Any, Any]]:
     if prepared.start is not None:
         given = prepared.start.arrays.given
         yield "given", given, np.arange(given.size)
+    if isinstance(prepared.jumps, ContactCode):
+        for name in ("mu", "mu_s", "ratio", "ratio_s", "e", "length"):
+            array = getattr(prepared.jumps.arguments[0], name)
+            yield f"contacts.{name}", array, np.arange(array.size)
     y = prepared.run.present.work.state[at.Y]
     yield ("start" if prepared.start is not None else "y"), y, np.arange(y.size)
     for k, one in enumerate(prepared.advances):

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
+from dap3d_core.formulations.contacts.decide import decide
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.jumps.law import JumpLaw
 from dap3d_core.formulations.jumps.rounds import jump
@@ -34,7 +35,7 @@ from dap3d_core.registry import Registry
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.control.held_inputs import HeldInputs
-from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.events.contact_jumps import ContactJumps
 from dap3d_core.simulation.events.uncarried_contact import UncarriedContact
 from dap3d_core.simulation.initial.assemble import model_size
 from dap3d_core.simulation.initial.breakpoints import SEEN
@@ -148,6 +149,40 @@ class JumpCode:
         return cls(function.compile([FLOAT, *map(type_of, given)]), given)
 
 
+@attrs.frozen(eq=False)
+class ContactCode:
+    """What contacts do where a mode ends (formulations/contacts/decide.py).
+
+    Attributes:
+        entry, arguments: as of ``JumpCode``.
+        names: of the contacts.
+    """
+
+    entry: Entry
+    arguments: tuple[Any, ...]
+    names: tuple[str, ...]
+
+    @classmethod
+    def of(cls, evaluator: Evaluator) -> "ContactCode":
+        """That of a model.
+
+        Raises:
+            SceneError: it cannot be exported.
+        """
+        if not evaluator.coordinates.are_of_bodies:
+            raise refusal(
+                f"events of contacts, which exported models of method {evaluator.method} do not "
+                "follow",
+                "export it by method lsq",
+            )
+        jumps = ContactJumps(evaluator)
+        table, arrays = jumps.table, jumps.table.arrays()
+        arrays.jammed = -1
+        given = arrays, evaluator.system, evaluator.loops, evaluator.functions, table.tensions
+        function: Any = decide
+        return cls(function.compile([FLOAT, *map(type_of, given)]), given, tuple(table.names))
+
+
 @attrs.define(eq=False, kw_only=True, slots=False)
 class StartArrays(Arrays):
     """What compiled code makes a start of."""
@@ -209,7 +244,7 @@ class PreparedRun:
         compiled, evaluator: the model.
         t_end: s, by default.
         advances: the integration that it begins with; for "auto" the implicit one as well.
-        jumps: the law of jumps; None where velocities do not.
+        jumps: the law of jumps, or what contacts do at events; None where velocities do not jump.
         start: how it starts; None where Python alone finds that.
     """
 
@@ -244,7 +279,7 @@ class PreparedRun:
             self.compiled, self.run = compiled, run
             self.evaluator: Evaluator = compiled.new_evaluator()
             run.evaluator = self.evaluator
-            self._refuse_jumps()
+            self._take_jumps()
             run.stops = [(stop.t, stop.jumps) for stop in self.stops]
             run.initialise()
             integrations = [run.present]
@@ -273,17 +308,19 @@ class PreparedRun:
         """True if steps follow contacts: rates of states are no functions of them then."""
         return self.advances[0].completes is not None
 
-    def _refuse_jumps(self) -> None:
-        self.jumps: JumpCode | None = None
+    def _take_jumps(self) -> None:
+        self.jumps: JumpCode | ContactCode | None = None
         if integrator_named(self.run.settings.integrator).steps_contacts:
             jumps_of(self.evaluator, self.run.settings)
             return
-        if names := self.evaluator.model.contact_names:
-            raise SimulationError(
-                "export does not take contacts yet that events follow, and the scene has some "
-                f'({names[0].partition("#")[0]}): let steps follow them, contact = "stepping"'
-            )
-        if any(s.jumps for s in self.evaluator.switches):
+        if self.evaluator.model.contact_count:
+            if self.drives:  # velocities then jump with them
+                raise refusal(
+                    "inputs that drivers read, beside contacts that events follow",
+                    'let steps follow the contacts (contact = "stepping"), or export it without',
+                )
+            self.jumps = ContactCode.of(self.evaluator)
+        elif any(s.jumps for s in self.evaluator.switches):
             self.jumps = JumpCode.of(self.evaluator)
 
     @property

@@ -2,7 +2,8 @@
    begins, and compiled functions; the integrators and equations are those that Python runs.
 
    It does what integrators/stepping/hold.py (inputs), simulation/handover.py (stiff scenes) and
-   simulation/events/jumps.py (velocities that jump) do, in the same order, for the same bits. */
+   simulation/events/jumps.py and contact_jumps.py (velocities that jump) do, in the same order, for
+   the same bits. */
 
 #define DAP3D_BUILD
 #include <math.h>
@@ -19,6 +20,13 @@ enum { RUNNING, FINISHED, STEP_FLOOR, NOT_FINITE, PROJECTION_FAILED, SWITCHED, C
        STIFF, JUMPED, STALLED, NO_ROOM };
 #define HORIZON 1e5
 #define ALIKE 1e-9
+/* As of contact_jumps.py: gaps that touch, in a run and at its start; what comes to no end. */
+#define TOUCHING 1e-10
+#define TOUCHING_AT_START 1e-8
+#define MOST_CHANGES 500
+#define WITHIN 1e-6
+#define MOST_STEPS 10000
+#define SLOW 1e-5
 #define LARGEST 1e100
 enum { GOES_ON, OVER, FAILED }; /* is_over */
 
@@ -32,6 +40,13 @@ struct dap3d_model {
     int64_t is_ahead;        /* steps have gone beyond the present time, which is interpolated */
     int64_t is_changed;      /* inputs have changed since the last step */
     int64_t jump_count;
+#if CONTACTS
+    int64_t failure;         /* why contacts have no motion to go on with (decide.py) */
+    int64_t change_count;    /* changes of modes, and when the latest were */
+    double latest[MOST_CHANGES];
+    int64_t stood;           /* steps up to a time, from which on they are too short where ... */
+    double since;
+#endif
     int64_t is_other;        /* 1: parameters that the start depends on are set; 2: it moves */
     int64_t has_begun;       /* what touches at the start has jumped */
     int64_t has_row;         /* the row is that of the present time, and so are the outputs */
@@ -326,11 +341,6 @@ static int project(dap3d_model *m)
     return 0;
 }
 
-static void advance(dap3d_model *m, int64_t budget)
-{
-    integrations[m->which].advance(m->w, budget);
-}
-
 /* As hand_over of a scene that has become stiff: the implicit integration goes on. */
 static int hand_over(dap3d_model *m)
 {
@@ -406,6 +416,81 @@ static int let_jump(dap3d_model *m, const double *crossing, const double *sides,
     return 1;
 }
 
+#endif
+
+#if CONTACTS
+enum { PRESCRIBED = 1, JAMMED, OVERLAPS, ENDLESS, SLOWLY };
+
+/* Let switches of contacts be on the side of what goes on. */
+static void go_on(dap3d_model *m, double *sides)
+{
+    for (int k = 0; k < 2 * CONTACTS; k++)
+        sides[m->w[CONTACT_SWITCHES + k]] = 1.0;
+}
+
+/* As ContactJumps._resolve: what contacts do at the present state, where switches have crossed, if
+   any; whether that went well. */
+static int let_touch(dap3d_model *m, const double *crossing, int starts)
+{
+    double *y = numbers(m, CONTACT_Y), rates[STATES], t = real_of(m)[R_t];
+    for (int c = 0; c < CONTACTS; c++)
+        numbers(m, CONTACT_LIMIT)[c] =
+            (starts ? TOUCHING_AT_START : TOUCHING) * numbers(m, CONTACT_LENGTH)[c];
+    for (int k = 0; k < 2 * CONTACTS; k++)
+        m->w[CONTACT_ENDED + k] = crossing != NULL && crossing[m->w[CONTACT_SWITCHES + k]] != 0.0;
+    m->w[CONTACT_INTEGER + CI_starts] = starts;
+    memcpy(y, y_of(m), 8 * STATES);
+    m->failure = contact_law(t, m->w);
+    if (m->failure)
+        return 0;
+    memcpy(y_of(m), y, 8 * STATES);
+    restart(m);
+    go_on(m, numbers(m, integrations[m->which].sides));
+    call(m, RHS, t, y_of(m), rates, STATES);
+    return 1;
+}
+
+/* As ContactJumps._refuse_endless: whether modes change ever faster. */
+static int are_endless(dap3d_model *m)
+{
+    double t = real_of(m)[R_t], span = fmax(m->span, fabs(t));
+    m->latest[m->change_count++ % MOST_CHANGES] = t;
+    if (m->change_count < MOST_CHANGES
+        || t - m->latest[m->change_count % MOST_CHANGES] > WITHIN * span)
+        return 0;
+    m->failure = ENDLESS;
+    return 1;
+}
+
+/* As ContactJumps.follow: the run ends where steps have become too short. Python may find there that
+   slip jams, and go on. */
+static void end_slow_run(dap3d_model *m)
+{
+    double t = real_of(m)[R_t];
+    int64_t steps = integer_of(m)[I_step_count];
+    if (t - m->since > SLOW * fmax(m->span, fabs(t)) || steps < m->stood) {
+        m->stood = steps;
+        m->since = t;
+    } else if (steps - m->stood > MOST_STEPS && integer_of(m)[I_status] == RUNNING) {
+        m->failure = SLOWLY;
+        real_of(m)[R_t_stop] = t;
+        integer_of(m)[I_status] = JUMPED;
+    }
+}
+
+/* Why contacts have no motion to go on with. */
+static void say_failure(dap3d_model *m, double t)
+{
+    static const char *const words[] = {
+        "", " closes, and joints or drivers prescribe the motion of its bodies",
+        " jams: its friction presses the bodies together by more than it lets them give way",
+        ": its bodies overlap at the start", "s change ever faster",
+        "s slip and turn by next to nothing: that asks for steps as short"};
+    int has_name = m->failure < ENDLESS;
+    const char *name = has_name ? contact_names[m->w[CONTACT_INTEGER + CI_culprit]] : "";
+    snprintf(m->message, sizeof m->message, "the run stopped at t = %.9g s: contact%s%s%s", t,
+             has_name ? " " : "", name, words[m->failure]);
+}
 #endif
 
 #if FIXED
@@ -513,6 +598,12 @@ static void start(dap3d_model *m)
         real_of(m)[R_t_stop] = real_of(m)[R_t];
     }
 #endif
+#if CONTACTS
+    if (!let_touch(m, NULL, 1)) {
+        integer_of(m)[I_status] = JUMPED;
+        real_of(m)[R_t_stop] = real_of(m)[R_t];
+    }
+#endif
 }
 
 /* As Jumps.apply, where an integration has stopped for it; whether it goes on. */
@@ -533,7 +624,30 @@ static int apply_jump(dap3d_model *m)
         real_of(m)[R_t_stop] = real_of(m)[R_t];
     }
 #endif
+#if CONTACTS
+    if (integer_of(m)[I_status] == JUMPED && !m->failure) {
+        double *sides = numbers(m, integrations[m->which].sides), crossing[SWITCHES];
+        m->jump_count++;
+        memcpy(crossing, sides + CROSSED_BEHIND_SIDES, sizeof crossing);
+        memset(sides + CROSSED_BEHIND_SIDES, 0, sizeof crossing);
+        for (int k = 0; k < 2 * CONTACTS; k++)
+            sides[COUNT_BEHIND_SIDES + m->w[CONTACT_SWITCHES + k]] = 0.0;
+        if (!are_endless(m) && let_touch(m, crossing, 0)) {
+            integer_of(m)[I_status] = RUNNING;
+            return 1;
+        }
+        real_of(m)[R_t_stop] = real_of(m)[R_t];
+    }
+#endif
     return hand_over(m);
+}
+
+static void advance(dap3d_model *m, int64_t budget)
+{
+    integrations[m->which].advance(m->w, budget);
+#if CONTACTS
+    end_slow_run(m);
+#endif
 }
 
 /* The run has stopped short of a time. */
@@ -548,6 +662,10 @@ static int stopped(dap3d_model *m)
     int64_t status = integer_of(m)[I_status];
     double t = status == FINISHED ? real_of(m)[R_t] : real_of(m)[R_t_stop];
     m->is_over = status == SWITCHED || status == FINISHED ? OVER : FAILED;
+#if CONTACTS
+    if (status == JUMPED)
+        return say_failure(m, t), DAP3D_ERROR;
+#endif
     snprintf(m->message, sizeof m->message, "the run stopped at t = %.9g s: %s", t,
              words[status >= 0 && status <= NO_ROOM ? status : 0]);
     return m->is_over == FAILED ? DAP3D_ERROR : DAP3D_ENDED;
@@ -634,6 +752,13 @@ static int jump(dap3d_model *m)
             return stopped(m);
         y_of(m)[STATES - 1] += kinetic_energy(m) - before;
     }
+#if CONTACTS
+    if (!let_touch(m, NULL, 0)) { /* what touches lifts, slips or sticks by the forces that act then */
+        integer[I_status] = JUMPED;
+        real[R_t_stop] = real[R_t];
+        return stopped(m);
+    }
+#endif
     return DAP3D_OK;
 }
 
@@ -776,6 +901,9 @@ int dap3d_set_states(dap3d_model *m, double t, const double *y)
 #endif
     integer_of(m)[I_segment_step] = integer_of(m)[I_segment_step_count] = 0;
     restart(m);
+#if CONTACTS
+    go_on(m, numbers(m, integrations[m->which].sides));
+#endif
     if (integer_of(m)[I_calls_accepted]) {
         double moved = real[R_projection_moved];
         real[R_projection_moved] = 1.0; /* as count_turns, from the start of a step */
@@ -893,6 +1021,18 @@ int dap3d_project(dap3d_model *m, double t, double *y, double *moved)
     return out[1] == 1.0 ? fail(m, DAP3D_ERROR, "no state on the constraints was found") : DAP3D_OK;
 }
 
+#if JUMPS
+static int does_jump(dap3d_model *m, int k) { return m->w[DOES_JUMP + k] != 0; }
+#elif CONTACTS
+static int does_jump(dap3d_model *m, int k)
+{
+    for (int c = 0; c < 2 * CONTACTS; c++)
+        if (m->w[CONTACT_SWITCHES + c] == k)
+            return 1;
+    return 0;
+}
+#endif
+
 int dap3d_event(dap3d_model *m, int *changed)
 {
     double y[STATES], moved;
@@ -902,19 +1042,24 @@ int dap3d_event(dap3d_model *m, int *changed)
     *changed = moved > 0.0;
     if (moved > 0.0 && dap3d_set_states(m, m->t, y) != DAP3D_OK)
         return DAP3D_ERROR;
-#if JUMPS
+#if JUMPS || CONTACTS
     double values[SWITCHES], crossing[SWITCHES];
-    int acted, crosses = 0;
+    int acted = 1, crosses = 0;
     dap3d_indicators(m, m->t, y, values);
     for (int k = 0; k < SWITCHES; k++) {
         double side = (values[k] > 0.0) - (values[k] < 0.0);
-        crossing[k] = m->w[DOES_JUMP + k] && side * m->sides[k] < 0.0 ? side : 0.0;
+        crossing[k] = does_jump(m, k) && side * m->sides[k] < 0.0 ? side : 0.0;
         m->sides[k] = crossing[k] != 0.0 || m->sides[k] == 0.0 ? side : m->sides[k];
         crosses |= crossing[k] != 0.0;
     }
     if (crosses) {
+#if CONTACTS
+        if (!let_touch(m, crossing, 0))
+            return say_failure(m, m->t), DAP3D_ERROR;
+#else
         if (!let_jump(m, crossing, m->sides, &acted))
             return fail(m, DAP3D_ERROR, "joints hold a velocity that is to jump");
+#endif
         if (acted)
             memcpy(m->sides, numbers(m, integrations[m->which].sides), sizeof values);
         m->has_row = 0;

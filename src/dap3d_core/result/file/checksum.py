@@ -63,9 +63,11 @@ def check_signature(file: Path, kind: str = "result") -> None:
     begin = beginning(file, len(_SIGNATURE))
     if begin != _SIGNATURE:
         fault = "it is not a NetCDF-4 file" if begin else "the file is empty"
-        hint = ""
-        if file.suffix == ".checkpoint":
-            hint = f"; to continue the run of a checkpoint: dap3d resume {file}"
+        remedies = {
+            ".checkpoint": f"; to continue the run of a checkpoint: dap3d resume {file}",
+            ".toml": f"; to simulate a scene: dap3d run {file}",
+        }
+        hint = remedies.get(file.suffix, "")
         raise ResultError(f"cannot read {file}: {fault}, so no {kind} of dap3d{hint}")
 
 

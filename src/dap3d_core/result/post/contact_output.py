@@ -69,7 +69,7 @@ def contact_outputs(evaluator: "Evaluator", arrays: "Arrays") -> dict[str, Conta
         evaluator: evaluates the model.
         arrays: of a result.
     """
-    from dap3d_core.formulations.contacts import contact_rows as rows
+    from dap3d_core.formulations.contacts import contact_table as rows
 
     table = rows.ContactTable(evaluator)
     t, u, states = arrays.t, arrays.u, arrays.states
@@ -85,15 +85,18 @@ def contact_outputs(evaluator: "Evaluator", arrays: "Arrays") -> dict[str, Conta
         evaluator.states = before
     modes: Any = states[:, table.mode]
     unknown = ~np.isfinite(modes)  # at an instant of which the state of bodies is known alone
-    for part in (rows.NORMAL, rows.FRICTION, rows.FORCE):
-        values[unknown, part] = np.nan
+    for first, end in ((rows.NORMAL, rows.SLIP), (rows.FORCE, rows.WIDTH)):
+        values[unknown, first:end] = np.nan
     modes = modes if unknown.any() else modes.astype(np.int64)
+
+    def part(k: int, first: int) -> Floats:
+        return values[:, k, first : first + 3]
+
     return {
         name: ContactOutput(
             gap=values[:, k, rows.GAP], normal_force=values[:, k, rows.NORMAL],
-            friction=values[:, k, rows.FRICTION], slip=values[:, k, rows.SLIP],
-            mode=modes[:, k], at=values[:, k, rows.PLACE],
-            force=values[:, k, rows.FORCE],
+            friction=part(k, rows.FRICTION), slip=part(k, rows.SLIP),
+            mode=modes[:, k], at=part(k, rows.PLACE), force=part(k, rows.FORCE),
             units=units_of(turns=bool(table.turns[k]), alone=bool(table.alone[k])),
         )
         for k, name in enumerate(table.names)

@@ -66,7 +66,7 @@ def _dot(a: Floats, b: Floats) -> Floats:
     return np.asarray(np.sum(a * b, axis=-1))
 
 
-#: Functions by name: the words of kernels for numbers, and three of vectors.
+#: Functions by name: the functions of kernels for numbers, and three of vectors.
 WORDS: Final[Mapping[str, Word]] = {
     **{name: Word(1, getattr(np, name)) for name in
        ("sin", "cos", "tan", "exp", "log", "sqrt", "abs", "sign", "floor", "sinh", "cosh", "tanh")},

@@ -43,16 +43,19 @@ def to_toml(scene: SceneTables) -> str:
     return "\n".join(lines)
 
 
-def save(scene: SceneTables, path: str | Path) -> Path:
+def save(scene: SceneTables, path: str | Path, force: bool) -> Path:
     """Write a scene to a file, whole or not at all; returns the file.
 
     Raises:
-        SceneError: the scene holds something a scene file cannot, or the file cannot be written.
+        SceneError: the scene holds something a scene file cannot, or the file cannot be written,
+            or exists and ``force`` is off.
     """
     text = to_toml(scene)
     try:
         path = Path(path)
         path = path / SCENE_FILE if path.is_dir() else path
+        if not force and os.path.exists(path):
+            raise file_error(path, "exists; force=True overwrites it")
         target = Path(os.path.realpath(path))  # a link stays one
         temporary = target.with_name(f".{uuid.uuid4().hex}.toml")
         try:

@@ -52,8 +52,12 @@ def _number_fault(value: Any) -> float | Fault:
         written = value.strip().replace(",", ".")
         if written.startswith("="):
             return Fault(should, "an expression needs [parameters], and is in no [simulation]")
-        is_number = len(written) <= LONGEST_NUMBER and _NUMBER.fullmatch(written)
-        return Fault(f"{should}, not text", f"write {written} without quotes" if is_number else "")
+        remedy, is_short = "", len(written) <= LONGEST_NUMBER
+        if is_short and _NUMBER.fullmatch(written):
+            remedy = f"write {written} without quotes"
+        elif is_short and _NUMBER.match(written):
+            remedy = "write a number without its unit, in SI units"
+        return Fault(f"{should}, not text", remedy)
     if type(value) is bool:
         return Fault(f"{should}, not a truth value")
     if type(value) is int or (type(value) is float and math.isfinite(value)):

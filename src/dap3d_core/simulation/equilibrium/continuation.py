@@ -116,6 +116,7 @@ class ParameterStatics:
         """Args: the evaluator; what loads its model at a parameter of 0 to 1."""
         self.evaluator, self._load = evaluator, load
         self._loaded = np.nan
+        self._first: Floats | None = None
         self.load(0.0)
         places = np.arange(evaluator.system.par.size)
         counted = [places[place] for place in evaluator.turn_places()]
@@ -157,9 +158,12 @@ class ParameterStatics:
         return PathPoint(s, pose, states, counters, tangent / length, stiffness)
 
     def _check_states(self, pose: StaticPose) -> None:
-        """Refuse a pose at which states of elements do not come to rest."""
-        from dap3d_core.simulation.equilibrium.statics import moving_states
+        """Refuse a pose at which states of elements do not come to rest, or keep the way there."""
+        from dap3d_core.simulation.equilibrium.statics import moving_states, refuse_carried
 
+        if self._first is None:
+            self._first = pose.u
+        refuse_carried(self.evaluator, self._first, pose.u)
         if moving := moving_states(self.evaluator, pose.u):
             names = ", ".join(f"{state.element}.{state.name}" for state in moving)
             raise SimulationError(f"a path cannot be followed: the rate of {names} vanishes for no "

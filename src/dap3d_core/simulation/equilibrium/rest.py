@@ -92,7 +92,7 @@ def find_rest(
         _hold_contacts(evaluator, u, "at the start of the search for an equilibrium")
     search = search_equilibrium(evaluator, u)
     if evaluator.model.state_count:
-        search = _with_states(evaluator, search)
+        search = _with_states(evaluator, search, u)
     if search.outcome is not Outcome.BALANCED:
         raise SimulationError(failure(search, evaluator.model))
     statics, pose = Statics(evaluator), search.pose
@@ -119,25 +119,21 @@ def _hold_contacts(evaluator: Evaluator, u: Floats, where: str) -> None:
     Raises:
         SimulationError: bodies overlap, or a contact slips.
     """
-    from dap3d_core.formulations.contacts.contact_rows import (
-        GAP,
-        ContactRows,
-        ContactTable,
-        JamError,
-        find_modes,
-    )
+    from dap3d_core.formulations.contacts.contact_table import GAP, ContactTable
+    from dap3d_core.formulations.contacts.decide import find_modes_at_rest
 
     table, still = ContactTable(evaluator), u.copy()
     velocities_of(still)[:] = 0.0
     gaps, limit = table.outputs(0.0, still)[:, GAP], TOUCHING * table.length
-    table.find_grips(0.0, still)
-    touching, slips = np.flatnonzero(gaps < limit).tolist(), "jams"
-    try:
-        found = find_modes(table, ContactRows(table, 0.0, still), touching, {}, [])
-        bad = [table.names[k] for k in np.flatnonzero((found.mode == 1.0) & (table.mu > 0.0))]
+    s, touching = table.arrays(), np.flatnonzero(gaps < limit)
+    s.y[:] = evaluator.integrated(still)
+    s.in_touch[: len(touching)], s.in_touch_count = touching, len(touching)
+    given = evaluator.system, evaluator.loops, evaluator.functions, table.tensions
+    if find_modes_at_rest(0.0, s, *given):
+        bad = [table.names[k] for k in np.flatnonzero((s.mode == 1.0) & (table.mu > 0.0))]
         slips = "slips"
-    except JamError as error:
-        bad = [str(error)]
+    else:
+        bad, slips = [table.names[k] for k in np.flatnonzero(s.jams)], "jams"
     if over := [table.names[k] for k in np.flatnonzero(gaps < -limit)]:
         bad, slips = over, "overlaps"
     if bad:
@@ -147,7 +143,7 @@ def _hold_contacts(evaluator: Evaluator, u: Floats, where: str) -> None:
             "(start=result)"
         )
     states = evaluator.states.copy()
-    states[table.mode], states[table.way], states[table.near] = found.mode, found.way, 0.0
+    states[table.mode], states[table.way], states[table.near] = s.mode, s.way, 0.0
     evaluator.states = states
 
 
@@ -197,14 +193,15 @@ def _with_brought(
     return multipliers, force
 
 
-def _with_states(evaluator: Evaluator, search: Search) -> Search:
+def _with_states(evaluator: Evaluator, search: Search, u: Floats) -> Search:
     """The search, its pose such that the states of elements are at rest as well.
 
     Raises:
-        SimulationError: states do not come to rest; names them.
+        SimulationError: states do not come to rest, or keep the way there; names them.
     """
-    from dap3d_core.simulation.equilibrium.statics import moving_states
+    from dap3d_core.simulation.equilibrium.statics import moving_states, refuse_carried
 
+    refuse_carried(evaluator, u, search.pose.u)
     moving = moving_states(evaluator, search.pose.u)
     if not moving:
         return search
@@ -326,8 +323,8 @@ def assumptions(evaluator: Evaluator, start: Floats, rows: ConstraintRows) -> It
     rolling = model.row_owners(np.flatnonzero(~model.position_row & (rows.nu == 0.0)))
     if rolling:
         yield information(
-            f"rolling joints constrain displacements as they do velocities: "
-            f"{some(rolling, MOST_NAMES)}; where they come to rest depends on the way"
+            "what rolls or sticks constrains displacements as it does velocities: "
+            f"{some(rolling, MOST_NAMES)}; where the scene comes to rest depends on the way there"
         )
 
 

@@ -22,7 +22,7 @@ from dap3d_core.kernels.runtime.function_lists import call_loop
 from dap3d_core.linear.rank.rank import tolerance_of
 from dap3d_core.model.element_states import ElementState, first_states, width_of
 from dap3d_core.model.state_layout import join, split
-from dap3d_core.simulation.errors import AssemblyError
+from dap3d_core.simulation.errors import AssemblyError, SimulationError
 from dap3d_core.simulation.initial.assemble import fit_of, weights_of
 from dap3d_core.simulation.initial.least_change import displaced, finite_rows, sparse_least_change
 from dap3d_core.simulation.linearization.tangent import TangentMatrices, tangent_matrices
@@ -37,6 +37,9 @@ MOST_PASSES = 25
 MOST_STEPS, SETTLED = 50, 1e-11
 #: Singular values below this part of the largest leave a state open.
 OPEN = 1e-10
+#: Displacements of bodies, rad or parts of the scene, below which a state that keeps the way of a
+#: motion stays.
+STAYED = 1e-6
 
 
 @attrs.frozen(eq=False)
@@ -264,12 +267,52 @@ def moving_states(evaluator: Evaluator, u: Floats) -> list[ElementState]:
             if np.any(moves[s.first : s.first + s.length])]  # fmt: skip
 
 
+def refuse_carried(evaluator: Evaluator, u: Floats, other: Floats) -> None:
+    """Refuse a motion from a state u to another that changes what no pose decides.
+
+    Raises:
+        SimulationError: rates of states vanish at rest whatever they are, as of elongations of
+            belts and deflections of bristles, and the motion would have changed them; or a joint
+            drives by its states, as of a motor that is on the way to its position.
+    """
+    shift, turn = displacement(u, other)
+    size = np.tile(np.repeat([evaluator.model.part_size, 1.0], 3), len(shift))
+    moves = np.zeros(evaluator.model.state_count, bool)
+    for pose in (u, other):
+        own = _derivatives(evaluator, 0.0, pose)
+        by_motion = _kept_way(own, _inverse(evaluator, own.rate_by_states))
+        change = np.abs(by_motion @ np.hstack([shift, turn]).ravel())
+        moves |= change > STAYED * (abs(by_motion) @ size)
+    driven = np.asarray(abs(own.velocity_by_states).sum(axis=1)).ravel() > 0.0
+    speeds = evaluator.rows(0.0, other).nu
+    if underway := evaluator.model.row_owners(np.flatnonzero(driven & (np.abs(speeds) > STAYED))):
+        raise SimulationError(
+            f"no equilibrium: {', '.join(underway)} moves bodies to another position. Let the "
+            "motion come to rest (simulate), and start at its end (start=result)"
+        )
+    carried = [f"{state.element}.{state.name}" for state in evaluator.model.element_states
+               if np.any(moves[state.first : state.first + state.length])]  # fmt: skip
+    if carried:
+        raise SimulationError(
+            f"statics does not know {', '.join(carried)} where forces balance: no pose decides such "
+            "a state, it keeps the way of the motion there. Let a damped motion come to rest "
+            "(simulate)"
+        )
+
+
+def _kept_way(own: StateDerivatives, inverse: Any) -> Any:
+    """(s, 6 n) changes of the states by displacements, where rates at rest leave them open."""
+    by_motion = own.rate_by_velocity
+    return by_motion - own.rate_by_states @ (inverse @ by_motion)
+
+
 def with_settled(tangent: "TangentMatrices", evaluator: Evaluator) -> "TangentMatrices":
-    """A tangent with the stiffness of settled states."""
+    """A tangent with the stiffness of settled states, and of those that keep the way of a motion."""
     own = tangent.states
     if own is None:
         return tangent
-    follows = _inverse(evaluator, own.rate_by_states) @ own.rate_by_displacement
+    inverse = _inverse(evaluator, own.rate_by_states)
+    follows = inverse @ own.rate_by_displacement - _kept_way(own, inverse)
     return attrs.evolve(tangent, stiffness=tangent.stiffness + own.force_by_states @ follows)
 
 

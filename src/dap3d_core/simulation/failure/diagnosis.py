@@ -83,7 +83,7 @@ def _jammed(evaluator: Evaluator, t: float, y: Floats) -> str:
     loaded = [int(k) for group in model.contacts if group.loaded is not None for k in group.members]
     if not loaded:
         return ""
-    from dap3d_core.formulations.contacts.contact_rows import ContactTable
+    from dap3d_core.formulations.contacts.contact_table import ContactTable
 
     modes = evaluator.states[ContactTable(evaluator).mode]
     slides = [model.joint_names[k] for k in loaded if modes[k - first] == 1.0]

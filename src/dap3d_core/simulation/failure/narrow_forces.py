@@ -11,13 +11,13 @@ from dap3d_core.model.knots import breaks_are_told
 from dap3d_core.result import information
 from dap3d_core.scene import Instance, ValidatedScene
 
-#: Words of kernels that choose between formulas.
+#: Functions of kernels that choose between formulas.
 CHOOSING = (where, lookup)
 #: Kernels that make the law of a force, and those of its states.
 LAWS = ("wrench", "energy")
 STATES = ("rate",)
-#: Python's own words for a number with a corner.
-CORNERS = ("abs", "min", "max")
+#: Python's own words for a number with a corner, and the one of an angle, which jumps at half a turn.
+CORNERS = ("abs", "min", "max", "atan2")
 
 
 def notes_on_laws(checked: ValidatedScene) -> list[str]:

@@ -3,13 +3,8 @@
 import attrs
 import numpy as np
 
-from dap3d_core.formulations.contacts.contact_rows import (
-    GAP,
-    REACH,
-    ContactRows,
-    ContactTable,
-    length_of,
-)
+from dap3d_core.formulations.contacts.contact_table import GAP, REACH, ContactTable
+from dap3d_core.formulations.contacts.rows import put_rows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.simulation.errors import SimulationError
@@ -66,23 +61,26 @@ class ContactForces:
     def __init__(self, evaluator: Evaluator) -> None:
         """Args: the evaluator of the model, in which all contacts are open."""
         self.table = ContactTable(evaluator)
+        self._arrays = self.table.arrays()
         self.outside: tuple[float, float, str] | None = None
 
     def at(self, t: float, u: Floats) -> Closed:
         """The contacts that a state u (13 n,) closes."""
-        table = self.table
-        outputs, rows = table.outputs(t, u), ContactRows(table, t, u)
-        still, slip = STILL * table.length, rows.slip
+        table, s, evaluator = self.table, self._arrays, self.table.evaluator
+        outputs = table.outputs(t, u)
+        put_rows(float(t), s, evaluator.system, evaluator.loops)
+        still, slip, G = STILL * table.length, s.slip, s.J[len(s.lam_free) :]
         near = (np.abs(outputs[:, GAP]) < CLOSED * table.length) & (outputs[:, REACH] >= 0.0)
-        columns, places, known = [], list[int](), np.zeros(len(rows.v))
+        columns, places, known = [], list[int](), np.zeros(len(s.v))
         cones: dict[int, tuple[list[int], float]] = {}
         states, loaded = table.evaluator.states.copy(), table.evaluator.states.copy()
         closed = (near & (np.abs(slip[:, 0]) < still)) | table.alone
         for c in np.flatnonzero(closed).tolist():
             across = table.across(c)
-            normal, tangents = rows.G[3 * c], rows.G[3 * c : 3 * c + 3][across]
-            sliding = length_of(slip[c, across]) > still[c]
-            way = slip[c, across] / length_of(slip[c, across]) if sliding else 0.0 * slip[c, across]
+            normal, tangents = G[3 * c], G[3 * c : 3 * c + 3][across]
+            size = float(np.linalg.norm(slip[c, across]))
+            sliding = size > still[c]
+            way = slip[c, across] / size if sliding else 0.0 * slip[c, across]
             friction = -table.mu[c] * (way @ tangents)
             own, first = [], len(places)
             if table.alone[c] and sliding and c not in table.loads:
@@ -98,8 +96,8 @@ class ContactForces:
             cones[c] = list(range(first, len(places))), float(table.mu_s[c])
             for some in (states, loaded) if c in table.loads and sliding else (states,):
                 some[table.mode[c]] = 1.0 if sliding else 2.0
-                some[table.way[c]] = table.length[c] * way @ rows.frames[c, across]
-        wrenches = np.array(columns).reshape(-1, len(rows.v)).T
+                some[table.way[c]] = table.length[c] * way @ s.frames[c, across]
+        wrenches = np.array(columns).reshape(-1, len(s.v)).T
         load = {c: np.inf if c in table.loads else 1.0 for c in cones}  # unknown at first
         return Closed(wrenches, known, cones, places, states, loaded, load)
 

@@ -166,15 +166,15 @@ def _refuse_unknown_modes(evaluator: Evaluator, t: float, u: Floats, states: Flo
     """Refuses a state at which bodies touch, in modes that are not known."""
     if states is not None or not evaluator.model.contact_count:
         return
-    from dap3d_core.formulations.contacts.contact_rows import GAP, ContactTable
+    from dap3d_core.formulations.contacts.contact_table import GAP, ContactTable
 
     table = ContactTable(evaluator)
     gaps = table.outputs(t, u)[:, GAP]
     k = int(np.argmin(gaps))
     if gaps[k] < AT_SWITCH * evaluator.model.length:
         raise SimulationError(
-            f"linearisation of a scene with contacts that touch ({table.names[k]}) takes modes "
-            "from a run: linearize(scene, at=result, t=...)"
+            f"whether what touches ({table.names[k]}) sticks or slips is known from a run alone: "
+            "linearize about a state of one, at=result, t=... (dap3d modes --from RESULT@TIME)"
         )
 
 

@@ -358,9 +358,15 @@ class ParameterMap:
 
 
 def _point_fields(checked: ValidatedScene, instance: Instance, point: str) -> Iterator[str]:
-    """Fields of an element that hold the coordinates of a declared point."""
+    """Fields of an element that hold the coordinates of a declared point.
+
+    Raises:
+        NotCopiedError: the point is in a list of points.
+    """
     scene, table = checked.scene, f"{instance.type_info.type.kind}s"
     element = getattr(scene, table)[instance.name]
+    if any(isinstance(v, list | tuple) and point in v for v in element.fields.values()):
+        raise NotCopiedError
     for field, spec in specs_of(instance.type_info.type).items():
         if spec.kind == "point" and element.fields.get(field) == point:
             yield field

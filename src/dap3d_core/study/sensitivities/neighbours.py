@@ -28,9 +28,13 @@ from dap3d_core.study.batch.parameter_map import NotCopiedError, ParameterMap
 from dap3d_core.study.batch.slopes import COPIES, starts_with_slopes
 from dap3d_core.study.differences import (
     OFFSETS,
+    SHORTER,
+    SHORTER_STEPS,
+    best_of,
     change_along,
     differences,
     power_of_two,
+    slope_at,
     weighted,
     weights_of,
 )
@@ -42,6 +46,9 @@ from dap3d_core.study.parameters import SceneParameter, all_parameters, with_val
 STEPS = (3e-3, 1e-3, 1e-4)
 #: Residual of corrected starts: of rounding.
 EXACT = 1e-15
+#: A vector of this length, but for so much, is a direction; one that is turned by more, where a
+#: parameter differs by a step, is another choice.
+UNIT, TURNED = 1e-12, 0.3
 #: What is written before it is read, or counts: without derivatives by parameters.
 WITHOUT = ("rows", "crossings")
 
@@ -73,11 +80,13 @@ class RunsBeside(NamedTuple):
         runs: each at its start.
         weights: of what each run has, in the derivative.
         offsets: how far the parameter is from its value in each.
+        places: the same in steps.
     """
 
     runs: tuple[Run, ...]
     weights: tuple[float, ...]
     offsets: tuple[float, ...]
+    places: tuple[int, ...]
 
 
 @attrs.define(eq=False, slots=False)
@@ -91,12 +100,13 @@ class Neighbours:
 
     parameter: SceneParameter
     copied: tuple[list[Floats], Floats] | None
-    _make: Callable[[], RunsBeside]
+    _make: Callable[[float], RunsBeside]
+    _closer: list[RunsBeside] = attrs.field(factory=list)
 
     @cached_property
     def made(self) -> RunsBeside:
         """The runs. Errors as of ``neighbours_of``."""
-        return self._make()
+        return self._make(1.0)
 
     @property
     def is_brought_back(self) -> bool:
@@ -108,6 +118,29 @@ class Neighbours:
         """The derivative by the parameter of what a function gives of a run."""
         pairs = zip(self.made.weights, self.made.runs, strict=True)
         return weighted([(w, function(run)) for w, run in pairs])
+
+    def smooth_derivative(self, function: Callable[[Run], Any]) -> Any:
+        """The same, by closer runs where a corner or a jump of the function lies among these."""
+        return best_of(
+            slope_at([function(run) for run in made.runs], made.places, max(made.offsets, key=abs)
+                     / max(made.places, key=abs))
+            for made in self._ever_closer()
+        )  # fmt: skip
+
+    def _ever_closer(self) -> Iterator[RunsBeside]:
+        yield self.made
+        for k in range(1, SHORTER_STEPS):
+            if len(self._closer) < k:
+                self._closer.append(self._make(SHORTER**-k))
+            yield self._closer[k - 1]
+
+    def offset_of(self, run: Run) -> float:
+        """How far the parameter is from its value in a run; 0 where the run is none of these."""
+        for made in (self.made, *self._closer):
+            for offset, other in zip(made.offsets, made.runs, strict=True):
+                if other is run:
+                    return offset
+        return 0.0
 
 
 def run_beside(
@@ -162,12 +195,13 @@ def _made(
     size: float,
     given: dict[str, Any],
     base: Run,
+    part: float,
 ) -> RunsBeside:
-    """Runs beside a run; arguments and errors as of ``neighbours_of``."""
+    """Runs beside a run, a part of the usual steps away; else as of ``neighbours_of``."""
     value, why = float(parameter.value or 0.0), ""
     for offsets in OFFSETS:
         for step in STEPS:
-            h = power_of_two(step * size)
+            h = power_of_two(part * step * size)
             try:
                 runs = tuple(
                     run_beside(compiled, given, [(parameter, value + k * h)], base.start)
@@ -182,7 +216,7 @@ def _made(
                 why = "the model has another structure there"
                 continue
             weights = tuple((weights_of(offsets) / h).tolist())
-            return RunsBeside(runs, weights, tuple(k * h for k in offsets))
+            return RunsBeside(runs, weights, tuple(k * h for k in offsets), offsets)
     raise SimulationError(
         f"there is no derivative by {parameter.name} at {value:g}: with values near it, the scene "
         f"cannot be run as here: {why}"
@@ -214,13 +248,31 @@ def floats_of(run: Run) -> dict[str, Floats]:
 
 
 def _are_alike(one: Run, other: Run) -> bool:
-    """True if the arrays of two runs are of the same sizes, and the same steps end at breaks."""
+    """True if the arrays of two runs are of the same sizes, and the same steps end at breaks.
+
+    Directions that types have chosen (``normals``) are those of the one, turned a little.
+    """
     shapes = [[(name, array.shape) for name, array in arrays_of(run)] for run in (one, other)]
     if shapes[0] != shapes[1]:
         return False
     stops = [run.present.work.stops for run in (one, other)]
     jumps = [table[BEFORE] < table[INSTANT] for table in stops]
-    return bool(np.array_equal(*jumps))
+    directions = [_vectors(run) for run in (one, other)]
+    is_unit = [np.abs(np.linalg.norm(v, axis=1) - 1.0) < UNIT for v in directions]
+    turns = np.linalg.norm(directions[0] - directions[1], axis=1)
+    has_turned = np.any(is_unit[0] & is_unit[1] & (turns > TURNED))
+    return bool(np.array_equal(*jumps)) and not has_turned
+
+
+def _vectors(run: Run) -> Floats:
+    """(k, 3) vectors among the constants of elements."""
+    found = [
+        group.numbers[:, first : first + 3]
+        for group in run.evaluator.model.acting
+        for first, shape in group.type_info.layout.numbers.values()
+        if shape == (3,)
+    ]
+    return np.concatenate([np.zeros((0, 3)), *found])
 
 
 def total_derivative(
@@ -246,7 +298,7 @@ def total_derivative(
     none = 0.0 if of_model else np.zeros_like(function(base, x))
     for j, neighbours in enumerate(beside):
         along = slopes[..., j]
-        total = neighbours.derivative(lambda run: function(run, x)) if of_model else none
+        total = neighbours.smooth_derivative(lambda run: function(run, x)) if of_model else none
         if step := change_along(x[..., motion], along[..., motion]):
             total = total + differences(lambda e: function(base, x + e * along), step)  # noqa: B023
         found.append(total)

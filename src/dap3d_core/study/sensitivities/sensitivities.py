@@ -45,8 +45,8 @@ if TYPE_CHECKING:
 
     from dap3d_core.simulation.initial.start_state import Start
 
-#: Directions of one run that make, with the value, vectors of 2, 4, 8 or 16 numbers.
-FAST = (1, 3, 7, 15)
+#: Directions of one run that fill vectors: 8 beside the value, others with it.
+FAST = (1, 3, 7, 8, 15)
 #: Motion of each body in data sets.
 OF_BODIES = ("r", "rd", "w")
 
@@ -470,10 +470,8 @@ class DifferentiatedRun(Run):
     def _offset_of(self, run: Run) -> tuple[float, int]:
         """How far the parameter of a neighbour is from its value, and which one it is."""
         for j, beside in enumerate(self.neighbours):
-            made = beside.made
-            for offset, other in zip(made.offsets, made.runs, strict=True):
-                if other is run and run is not self.base:
-                    return offset, j
+            if offset := beside.offset_of(run):
+                return offset, j
         return 0.0, 0
 
 

@@ -27,6 +27,9 @@ LAWS = {"force": ("wrench", "rate"), "joint": ("C", "nu", "gamma", "rate"), "fun
 SAMPLES, REACH, PLACES = 2, 4.0, 65
 #: Halvings of an interval in which a condition changes; a jump is more than this part of the law.
 HALVINGS, JUMP = 60, 1e-6
+#: Two halvings in a row that leave so small a part of a jump show that there is none: what the law
+#: changes by beside a jump is halved each time, and can hide it once.
+CONTINUOUS = JUMP / 8.0
 #: Changes of a condition that are looked at: where it changes its law jumps, or does not.
 TRIES = 8
 #: A switch changes its sign within this distance of the place.
@@ -145,7 +148,7 @@ class _Path:
         self._width = 2.0 * REACH / (PLACES - 1)
 
     def changes(self, tried: Counter[int]) -> Iterator[float]:
-        """Distances at which a condition of the kernel changes, a few of each condition.
+        """Distances at which a condition changes and the law may jump, a few of each condition.
 
         tried: how often each condition was met, on other ways as well.
         """
@@ -158,16 +161,30 @@ class _Path:
             one, other = results[k], results[k + 1]
             for which in np.flatnonzero(np.array(one) != np.array(other)):
                 tried[int(which)] += 1
-                if tried[int(which)] <= TRIES:
-                    yield self._located(places[k], places[k + 1], int(which), one[which])
+                if tried[int(which)] > TRIES:
+                    continue
+                place = self._located(places[k], places[k + 1], int(which), one[which])
+                if place is not None:
+                    yield place
 
-    def _located(self, a: float, b: float, which: int, first: bool) -> float:
+    def _located(self, low: float, high: float, which: int, first: bool) -> float | None:
+        """Where a condition changes, from behind; None where the law is continuous there."""
+        laws = [self._evaluated(low)[0], self._evaluated(high)[0]]
+        small = 0
         for _ in range(HALVINGS):
-            middle = 0.5 * (a + b)
-            if middle in (a, b):  # neighbouring numbers
+            middle = 0.5 * (low + high)
+            if middle in (low, high):  # neighbouring numbers
                 break
-            a, b = (middle, b) if self._results(middle)[which] == first else (a, middle)
-        return float(b)
+            law, results = self._evaluated(middle)
+            if results[which] == first:
+                low, laws[0] = middle, law
+            else:
+                high, laws[1] = middle, law
+            change, size = np.max(np.abs(laws[1] - laws[0])), 1.0 + np.max(np.abs(laws))
+            small = small + 1 if change < CONTINUOUS * size else 0
+            if small == 2:
+                return None
+        return float(high)
 
     def bracket(self, place: float) -> tuple[float, float]:
         """Distances just before and behind a place."""
@@ -185,13 +202,17 @@ class _Path:
             return np.zeros(0)
         return self._sample.value("switch", self._at(x))
 
-    def _results(self, x: float) -> list[bool]:
-        """Results of all comparisons that the kernel makes."""
+    def _evaluated(self, x: float) -> tuple[Floats, list[bool]]:
+        """The kernel, and the results of all comparisons that it makes."""
         ComparedPart.results.clear()
-        self._sample.kernels.value_with(
+        law = self._sample.kernels.value_with(
             ComparedNumber, self._name, self._sample.element, self._at(x)
         )
-        return list(ComparedPart.results)
+        return law.astype(complex).real, list(ComparedPart.results)
+
+    def _results(self, x: float) -> list[bool]:
+        """Results of all comparisons that the kernel makes."""
+        return self._evaluated(x)[1]
 
     def _all_results(self, places: Floats, first: list[bool]) -> list[list[bool]]:
         """The same at all places, at once where the kernel takes a vector for each number."""

@@ -174,7 +174,7 @@ def rates(sample: Sample, name: str, along: Direction, comparison: Comparison) -
     except Exception as error:
         comparison.note(
             f"{name} does not run on complex numbers ({type(error).__name__}: {error}), so its "
-            "derivatives are differences alone; take the words of dap3d_core.kernels"
+            "derivatives are differences alone; take the functions of dap3d_core.kernels"
         )
     value, bound = sample.difference(name, along)
     derivatives.append(Rate(value, bound, DIFFERENCE_TOLERANCE, "differences"))

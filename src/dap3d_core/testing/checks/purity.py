@@ -107,7 +107,7 @@ def _compare_compiled(c: Comparison, subject: SampledType, kind: str) -> None:
             c.kernel = kind
             c.fail(
                 f"the kernels of its loop cannot be compiled ({kind}): {error}; a kernel is plain: "
-                "tuples of numbers, the words of dap3d_core.kernels, where() for branches"
+                "tuples of numbers, the functions of dap3d_core.kernels, where() for branches"
             )
             return
         for name, value in found.items():
@@ -188,7 +188,7 @@ class _BranchError(TypeError):
 
 
 class _Condition:
-    """A comparison of numbers with a result that only the words of kernels may read."""
+    """A comparison of numbers with a result that only the functions of kernels may read."""
 
     __slots__ = ("holds",)
 
@@ -241,7 +241,7 @@ class _OpaqueNumber(Stepped):
 
 
 def plain(subject: SampledType) -> CheckOutcome:
-    """Kernels branch by ``where`` only, and take their mathematics from the words of kernels."""
+    """Kernels branch by ``where`` only, and take mathematics from dap3d_core.kernels."""
     words = "kernels run on numbers that are no floats, as derivatives and compilers have them"
     c = Comparison("plain", subject, "", words)
     for name, kernel in subject.type_info.kernels.items():

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from support.internals import rotation
 
 from dap3d_core.assembly.collisions.find import ShapeFinder
-from dap3d_core.model.rotations import rotation
 from dap3d_core.scene.contacts.collision_shapes import (
     BOX,
     CAPSULE,

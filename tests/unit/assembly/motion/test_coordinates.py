@@ -5,13 +5,12 @@ The motions of a scene's joints are found once for each scene that has them.
 
 import numpy as np
 import pytest
-from support.internals import Pose, compose, inverse, relative, rotation_vector, split
+from support.internals import Pose, classify, compose, inverse, relative, rotation_vector, split
 from support.joint_pairs import BETWEEN, STANDARD, compiled_pair, pair
 from support.rotations import to_body
 
 import dap3d_core as dap
 from dap3d_core.assembly.motion import coordinates as motion_coordinates
-from dap3d_core.assembly.motion.classify import classify
 from dap3d_core.assembly.motion.coordinates import (
     aliases,
     coordinate_rates,

@@ -17,6 +17,7 @@ from tests.e2e.conftest import COMMAND, environment
 
 import dap3d_core as dap
 from dap3d_core.cli import main
+from dap3d_core.result.file.atomic_write import whole_file
 
 ARM = REPOSITORY / "tests" / "data" / "formats" / "arm.urdf"
 #: Width of the narrowest terminal that lines are made for.
@@ -83,7 +84,7 @@ RESPONSE = ("response", "fall.toml", "--input", "gravity.gravity", "--output", "
 REFUSED = [
     # settings
     (("run", "fall.toml", "--t-end", "-1"), "--t-end = -1.0: should be at least 0"),
-    (("run", "fall.toml", "--t-end", "soon"), "'soon' is not a valid float"),
+    (("run", "fall.toml", "--t-end", "soon"), "'soon' is not a valid number in s"),
     (("run", "fall.toml", "--t-end", "1e12", "--dt", "1"), "9.69e+04 GiB"),
     (("run", "fall.toml", "--integrator", "rk4"), "rk4 does not choose its step"),
     (("run", "fall.toml", "--checkpoint", "0"), "'0' is no time; write 90, 90s, 5min or 2h"),
@@ -144,8 +145,8 @@ REFUSED = [
     (("run", "fall.toml", "--t-end"), "requires an argument"),
     (("run", "--", "fall.toml", "--t-end", "1"), "unexpected extra arguments (--t-end 1)"),
     (("run", "fall.toml", "--", "-o", "x.nc"), "unexpected extra arguments (-o x.nc)"),
-    (("run", ""), "is an empty word"),
-    (("run", "fall.toml", "-o", ""), "'--output' is an empty word"),
+    (("run", ""), "'MODEL' is empty"),
+    (("run", "fall.toml", "-o", ""), "'--output' is empty"),
     (("rnu", "fall.toml"), "did you mean 'run'"),
     (("--bogus",), "No such option '--bogus'"),
     # files of scenes
@@ -187,7 +188,7 @@ REFUSED = [
     (("run", "fall.toml", "--from", "fall.toml"), "fall.toml"),
     (("run", "fall.toml", "--from", R, "--start", "equilibrium"), "give one"),
     (("run", "fall.toml", "--start", "rest"), "'scene', 'equilibrium'"),
-    (("run", "fall.toml", "--from", ""), "is an empty word"),
+    (("run", "fall.toml", "--from", ""), "is empty"),
     (("run", "pen1", "--from", R), "it is of another scene: it has no body cone"),
     (("equilibrium", "fall.toml", "--from", R, "-o", R, "--force"), "is the input file"),
     # results
@@ -233,8 +234,8 @@ REFUSED = [
     *((("new-plugin", n, "--kind", k, *force), f"dap3d itself has the {k} '{n}'")
       for k, n in (("integrator", "auto"), ("shape", "box")) for force in ((), ("--force",))),
     *((("plugins", "--no-compile", "--limit", n), "--limit") for n in ("nan", "inf", "0", "-1")),
-    (("import", "nothing.urdf"), "there is no file nothing.urdf"),
-    (("import", "sub"), "sub is a folder"),
+    (("import", "nothing.urdf"), "nothing.urdf: there is no such file"),
+    (("import", "sub"), "sub: is a folder"),
     (("import", "amr.urdf"), "did you mean 'arm.urdf'"),
     (("import", "arm.urdf", "--strict"), "effort"),
     (("import", "arm.urdf", "--root", "nowhere"), "nowhere is no folder"),
@@ -357,7 +358,6 @@ def test_a_folder_that_is_read_only_is_refused(folder):
 def test_of_two_that_write_one_file_at_once_one_wins_whole(tmp_path):
     """Many times, for it is a race: the file is that of one of them, the other is told."""
     from dap3d_core.result import ResultError
-    from dap3d_core.result.file.atomic_write import whole_file
 
     told, texts = [], ["a" * 5000, "b" * 5000]
 
@@ -384,8 +384,6 @@ def test_of_two_that_write_one_file_at_once_one_wins_whole(tmp_path):
 
 def test_of_several_that_overwrite_one_file_at_once_none_disturbs_another(tmp_path):
     """With force each of them succeeds, and the file is always that of one of them, whole."""
-    from dap3d_core.result.file.atomic_write import whole_file
-
     target, errors, texts = tmp_path / "run.nc", [], [letter * 5000 for letter in "abcd"]
     barrier = threading.Barrier(len(texts))
 

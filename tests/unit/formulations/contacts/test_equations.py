@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.formulations.contacts.contact_rows import ContactTable
-from dap3d_core.formulations.contacts.inverse import invert
+from dap3d_core.formulations.contacts.contact_table import ContactTable
+from dap3d_core.linear.inverse import invert
 from dap3d_core.simulation import CompiledModel
 
 G, MU, MASS, HEIGHT = 9.81, 0.3, 2.0, 0.05

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.formulations.contacts.contact_rows import ContactRows, ContactTable, find_modes
+from dap3d_core.formulations.contacts.contact_table import ContactTable
+from dap3d_core.formulations.contacts.decide import find_modes_at_rest
 from dap3d_core.simulation import CompiledModel
 
 MASS, HEIGHT, MU, G = 3.0, 0.2, 0.3, 9.81
@@ -23,9 +24,12 @@ def test_feet_share_their_load_where_more_forces_hold_than_the_motion_needs(slid
         scene.add_point(f"foot{k}", "sled", (x, y, -HEIGHT))
         scene.add_contact("ball_plane", f"floor{k}", P_i=f"foot{k}", mu=MU)
     model = CompiledModel(scene)
-    table = ContactTable(model.evaluator)
-    rows = ContactRows(table, 0.0, model.model.u0)
-    found = find_modes(table, rows, [0, 1, 2], {}, [])
+    evaluator = model.evaluator
+    table = ContactTable(evaluator)
+    found = table.arrays()
+    found.in_touch[:], found.in_touch_count = [0, 1, 2], 3
+    given = evaluator.system, evaluator.loops, evaluator.functions, table.tensions
+    assert find_modes_at_rest(0.0, found, *given)
     assert (found.mode == (1.0 if slides else 2.0)).all()
     assert found.near.any() != slides
     arms = np.column_stack([FEET, np.full(3, -HEIGHT)])

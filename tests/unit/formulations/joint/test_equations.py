@@ -4,11 +4,10 @@ import attrs
 import numpy as np
 import pytest
 from support import trees
-from support.internals import correct_initial, pose, u_from_y
+from support.internals import TOLERANCE_C, TOLERANCE_V, correct_initial, pose, u_from_y
 from support.plain import long_in_plain_python
 
 import dap3d_core as dap
-from dap3d_core.assembly.arrays import TOLERANCE_C, TOLERANCE_V
 from dap3d_core.formulations import PROJECT
 from dap3d_core.simulation import CompiledModel
 

@@ -4,12 +4,11 @@ import re
 
 import llvmlite.binding as llvm
 import pytest
-from support.internals import off_constraints
+from support.internals import off_constraints, write_program
 from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.formulations.programs.operations import operations
-from dap3d_core.formulations.programs.scene_program import write_program
 
 pytestmark = long_in_plain_python
 

@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-from support.internals import MASS, Symbol
+from support.internals import MASS, Item, StraightLine, Symbol, constant_numbers, constant_parts
 
 import dap3d_core as dap
-from dap3d_core.formulations.programs.scene_program import constant_numbers, constant_parts
 from dap3d_core.formulations.programs.symbolic_arrays import SymbolicSystem, constants
 from dap3d_core.integrators import EXPLICIT
-from dap3d_core.kernels.compiler.straight_line import Item, StraightLine
 
 
 @pytest.fixture(scope="module")

@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-from support.internals import compiled, off_constraints
+from support.internals import compiled, load_programs, objects, off_constraints, write_programs
 from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.formulations import OUTCOMES, PROJECT
-from dap3d_core.formulations.programs.scene_program import load_programs, write_programs
-from dap3d_core.kernels.compiler import objects
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 

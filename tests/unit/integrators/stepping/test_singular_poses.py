@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 from support import redundant
-from support.internals import store_reference_pivots
+from support.internals import MEASURES, store_reference_pivots
 from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
-from dap3d_core.integrators.stepping.integration_state import MEASURES
 from dap3d_core.integrators.stepping.singular_poses import (
     NOW,
     RATE,

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.internals import LoopArrays, build, call_loop, loop_list, specs_of
+from support.internals import LoopArrays, build, call_loop, loop_list, specs_of, write
 
 from dap3d_core.interface import (
     Body,
@@ -18,7 +18,6 @@ from dap3d_core.interface import (
     point,
     vector,
 )
-from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.kernels import add
 from dap3d_core.kernels.runtime import loop_support
 

@@ -5,12 +5,11 @@ of numbers of order one."""
 
 import numpy as np
 import pytest
-from support.internals import call_kinds, place_bodies, split
+from support.internals import ENERGY, VALUE, WRENCH, call_kinds, place_bodies, split
 from support.motions import Motion
 from support.own_types import registry_of
 
 import dap3d_core as dap
-from dap3d_core.assembly.arrays import ENERGY, VALUE, WRENCH
 from dap3d_core.interface import (
     Body,
     Force,

@@ -7,12 +7,11 @@ import warnings
 import numpy as np
 import pytest
 import sympy
-from support.internals import call_kinds
+from support.internals import ANGLE, call_kinds
 from support.own_types import registry_of
 from support.plain import jit_is_on
 
 import dap3d_core as dap
-from dap3d_core.assembly.arrays import ANGLE
 from dap3d_core.interface import (
     REQUIRED,
     Body,

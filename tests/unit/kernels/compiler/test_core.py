@@ -175,16 +175,30 @@ NOT_CALLED = {
             "add_sliding solve_forces put_sliding_force put_sizes largest_entry begin_to_move "
             "clear_rounding"
         ),
-        "formulations.contacts.impulses": "begin_problem put_impulses stop_slip",
+        "formulations.contacts.contact_table": "call_tension put_outputs find_grips",
+        "formulations.contacts.decide": (
+            "decide repeat remember_modes find_overlap put_in_touch take_ended stop leave_movable "
+            "put_opening find_modes_now find_modes_at_rest settle put_roles put_state"
+        ),
+        "formulations.contacts.impacts": (
+            "begin_problem put_impulses stop_slip collide take_part end_bounces remember_round act "
+            "count_work unjam stop_low_rocking hold_low repeat_rounds"
+        ),
+        "formulations.contacts.rows": (
+            "put_rows let_stick put_jacobian put_answers along_bodies put_moves put_driven "
+            "add_scaled put_frames put_feels put_slip put_velocities move_on put_free kick change "
+            "unscale lift follow_joints put_held"
+        ),
         "formulations.contacts.loads": "find_modes put_loaded put_loads remember extrapolate",
         "formulations.contacts.modes": (
             "put_closed clear_mode next_group sort close_group put_modes all_stay let_leave "
             "put_returning put_found put_one nearly_jams"
         ),
         "formulations.contacts.sharing": (
-            "do_share put_own_rows part_of_cones hold_inside are_held_within leave_to_others "
+            "do_share put_own_rows left_of bring_in hold_inside are_held_within leave_to_others "
             "factor_rows freedom_of"
         ),
+        "linear.inverse": "invert",
         "linear.least_squares": "factor_least longest_column reflect fold solve_least",
         "formulations.contacts.equations": (
             "accelerate add_columns add_friction column force_of force_of_one has_settled "
@@ -192,7 +206,6 @@ NOT_CALLED = {
             "largest_given project report rhs watch contact_of fill_load has_loads solve_loads "
             "are_independent"
         ),
-        "formulations.contacts.inverse": "invert",
         "formulations.contacts.watched_rates": "store_watched take_watched",
         "formulations.joint_loops.contacts": (
             "accelerate add_contact_forces add_scaled find_columns find_multipliers project report "
@@ -216,22 +229,23 @@ def repeated(runs, few, more="", every=()):
     return json.loads(run(script, timeout=1200).splitlines()[-1])
 
 
-@pytest.fixture(scope="module")
-def found():
-    """Recorded once: to record takes as long as to compile."""
-    return repeated(RUNS, ["differentiated"], MORE, ["O3"])
+@pytest.fixture(scope="module", params=["O0", pytest.param("O3", marks=pytest.mark.long)])
+def found(request):
+    """Recorded once: to record takes as long as to compile. To optimise takes longest."""
+    return repeated(RUNS, ["differentiated"], MORE, [request.param])
 
 
-def test_calls_of_a_short_run_have_the_bits_of_plain_python():
-    (count, different), *_ = repeated(QUICK, ["O0"])
+@pytest.mark.parametrize("level", ["O0", pytest.param("O3", marks=pytest.mark.slow)])
+def test_calls_of_a_short_run_have_the_bits_of_plain_python(level):
+    (count, different), *_ = repeated(QUICK, [level])
     assert count > 100
     assert different == []
 
 
 @pytest.mark.slow
 def test_each_compiled_function_of_the_core_has_the_bits_of_plain_python(found):
-    """Optimised for this processor; functions not called are listed.
-    Without FMA: `make no-fma`. Unoptimised: a short run, above."""
+    """Functions not called are listed. Optimised for releases, those of a short run always.
+    Without FMA: `make no-fma`."""
     _, (count, different), missing = found
     assert count > 4000
     assert different == []

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 from support.at_all_levels import compiled_at_all_levels
-from support.internals import FLOAT, INT, MATRIX, VECTOR, Array, CompileError
+from support.internals import FLOAT, INT, MATRIX, VECTOR, Array, CompileError, Program
 from support.plain import jit_is_on
-
-from dap3d_core.kernels.compiler.functions import Program
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 

@@ -7,11 +7,20 @@ from itertools import count
 
 import numpy as np
 import pytest
-from support.internals import FLOAT, Array, Entry, Functions, Program, Signature, Unit
+from support.internals import (
+    FLOAT,
+    Array,
+    Entry,
+    Functions,
+    Program,
+    Signature,
+    Unit,
+    background,
+    objects,
+    units,
+)
 from support.plain import jit_is_on
 from support.process import run, start
-
-from dap3d_core.kernels.compiler import background, objects, units
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 
@@ -173,9 +182,9 @@ print(r.u.tobytes().hex()[:400])
 
 @pytest.mark.slow
 def test_processes_that_race_on_an_empty_cache_have_the_same_bits(tmp_path):
-    racers = [start(RUN, tmp_path / "cache") for _ in range(3)]
+    racers = [start(RUN, tmp_path / "cache") for _ in range(2)]
     said = [p.communicate(timeout=300)[0] for p in racers]
-    assert [p.returncode for p in racers] == [0, 0, 0]
+    assert [p.returncode for p in racers] == [0, 0]
     assert len(set(said)) == 1
     assert run(RUN, tmp_path / "cache") == said[0].strip()
 

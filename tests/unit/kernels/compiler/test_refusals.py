@@ -5,12 +5,20 @@ import math
 import numpy as np
 import pytest
 from support.at_all_levels import function_of
-from support.internals import FLOAT, INT, Array, CompileError, Program, Signature, Table
+from support.internals import (
+    FLOAT,
+    INT,
+    Array,
+    CompileError,
+    Program,
+    Signature,
+    Table,
+    compile_all,
+)
 from support.own_types import registry_of
 from support.plain import jit_is_on
 
 from dap3d_core.interface import Body, Force, PluginError, body, examine, number
-from dap3d_core.interface.codegen.compile_loops import compile_all
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 VECTOR, MATRIX = Array(FLOAT, 1), Array(FLOAT, 2)

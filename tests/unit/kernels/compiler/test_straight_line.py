@@ -5,11 +5,9 @@ import math
 
 import numpy as np
 import pytest
-from support.internals import Symbol, TraceError
+from support.internals import Item, StraightLine, Symbol, TraceError, objects
 
 from dap3d_core.kernels import atan2, cos, exp, sqrt, tanh, where
-from dap3d_core.kernels.compiler import objects
-from dap3d_core.kernels.compiler.straight_line import Item, StraightLine
 
 START = [0.3, -1.7, 2.5, 0.0]
 

@@ -6,23 +6,23 @@ from support.at_all_levels import made_of, same_bits, targets
 from support.internals import (
     BODY_WIDTH,
     LOOP,
+    LOOP_KINDS,
     LoopArrays,
     array_members,
     sample_classes,
     sized_fields,
     source_of,
+    trace,
+    with_functions,
+    write,
 )
 from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.interface import examine
-from dap3d_core.interface.codegen.compile_loops import write
-from dap3d_core.interface.codegen.loop_source import LOOP_KINDS
 from dap3d_core.interface.codegen.reactions import bind_joints, joints_read
 from dap3d_core.interface.codegen.specialise import bind_friction
-from dap3d_core.kernels.compiler.trace import trace
 from dap3d_core.kernels.runtime import generated_modules
-from dap3d_core.testing.samples.sampled_type import with_functions
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 BODIES, INSTANCES, TRIALS = 8, 3, 6

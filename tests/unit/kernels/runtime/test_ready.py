@@ -4,13 +4,11 @@ import sys
 
 import numpy as np
 import pytest
-from support.internals import FLOAT, Array, Entry, Program, Signature, Unit
+from support.internals import FLOAT, Array, Entry, Program, Signature, Unit, objects, ready, units
 from support.plain import jit_is_on
 from support.process import REPOSITORY
 
 from dap3d_core.kernels import atan2, sin, sqrt
-from dap3d_core.kernels.compiler import objects, units
-from dap3d_core.kernels.runtime import ready
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 sys.path.append(str(REPOSITORY / "tools"))

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 from support.graphs import Case, chain, free_star, full_case, ring, star, tree
-
-from dap3d_core.linear.ldlt.plan import make_plan
+from support.internals import make_plan
 
 
 @pytest.mark.parametrize("name", ["chain", "welded chain", "star", "free star"])

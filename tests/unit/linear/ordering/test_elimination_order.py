@@ -120,6 +120,7 @@ def test_nets_are_solved(name, panels_everywhere):
     check_solution(case)
 
 
+@pytest.mark.thinned(3)
 @pytest.mark.every(5)
 @pytest.mark.parametrize("name", [*GRAPHS, *RANDOM])
 def test_any_graph_is_solved_with_panels(name, panels_everywhere):

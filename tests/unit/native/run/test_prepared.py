@@ -1,4 +1,4 @@
-"""Velocities that jump in exported models: the bits of runs in Python."""
+"""Velocities that jump, and contacts, in exported models: the bits of runs in Python."""
 
 import numpy as np
 import pytest
@@ -92,3 +92,99 @@ def test_a_driver_that_an_input_sets_does_work(tmp_path):
         there.step_to(here.t)
         assert there["work"] == pytest.approx(0.5 * 1.08 * speed**2, rel=1e-13)
         assert there["work"] == pytest.approx(here.state["work"], rel=1e-14)
+
+
+def thrown(**more):
+    """A ball that bounces, slides and rolls; e and mu."""
+    scene = dap.Scene(name="thrown")
+    scene.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=[0, 0, 0.3], r_dot=[3.0, 0, 0])
+    scene.add_force("weight", "g")
+    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1, mu=0.3, e=0.5, **more)
+    return scene
+
+
+def sled():
+    """A box that slides on four of its corners, which share what they carry, and stops."""
+    scene = dap.Scene(name="sled")
+    scene.add_body("box", mass=1.0, Jp=[0.01, 0.015, 0.02], r=[0, 0, 0.05], r_dot=[1.0, 0.2, 0])
+    scene.add_force("weight", "g")
+    scene.add_contact("box_plane", "floor", P_i="box.O", size=[0.4, 0.3, 0.1], mu=0.3, mu_s=0.4)
+    return scene
+
+
+def door():
+    """A pendulum between limits, with friction of its hinge by a moment, and by its load."""
+    scene = dap.Scene(name="door")
+    scene.add_body("door", mass=1.0, Jp=[0.01, 0.02, 0.02], r=[0.5, 0, 0], w=[0, -4.0, 0])
+    scene.bodies["door"].r_dot = [0.0, 0.0, 2.0]
+    scene.add_point("pin", "door", [-0.5, 0, 0])
+    hinge = {"P_i": "pin", "P_j": "ground.O", "a_i": "door.y", "a_j": "ground.y"}
+    scene.add_joint("rev", "hinge", **hinge, lower=-0.6, upper=0.6, e=0.5)
+    scene.add_force("weight", "g")
+    scene.add_force("rot_friction", "rubs", joint="hinge", n_c=0.1)
+    scene.add_force("friction", "presses", joint="hinge", mu=0.1, radius=0.02)
+    return scene
+
+
+@pytest.mark.every(5)
+@pytest.mark.parametrize(
+    ("make", "settings"),
+    [
+        *((thrown, {"integrator": name}) for name in ("dop853", "adams", "radau", "auto")),
+        (thrown, {"integrator": "rk4", "step": 1e-3}),
+        (sled, {}),
+        *((door, {"method": method}) for method in ("lsq", "auto")),
+    ],
+)
+def test_contacts_that_events_follow_have_the_bits_of_simulate(tmp_path, make, settings):
+    settings = {name: value for name, value in settings.items() if value != "auto"} | (
+        {"integrator": "auto"} if settings.get("integrator") == "auto" else {}
+    )
+    assert any(e.kind for e in dap.simulate(make(), t_end=1.5, **settings).events)
+    assert differences(make(), tmp_path, 1.5, **settings)
+
+
+@pytest.mark.slow
+def test_contacts_between_steps_with_inputs_and_saved_states(tmp_path):
+    scene = thrown()
+    scene.add_input("wind", value=0.0)
+    scene.add_force("f", "blow", body_i="ball", f=(1.0, 0.0, 0.0), input="wind")
+    _, library = exported(scene, tmp_path, outputs=["ball.r", "ball.w"])
+    here, there, other = dap.start(scene, t_end=1.0), library.start(1.0), library.start(1.0)
+    for k in range(20):
+        wind = 5.0 * float(np.sin(k))
+        here.step(0.05, inputs={"wind": wind})
+        other.load(there.save())
+        for run in (there, other):
+            run["wind"] = wind
+            run.step_to(here.t)
+            for name in ("ball.r.x", "ball.r.z", "ball.w.y"):
+                assert run[name] == here.state[name]
+
+
+@pytest.mark.slow
+def test_friction_and_restitution_are_parameters(tmp_path):
+    names = ["contacts.floor.mu", "contacts.floor.e"]
+    made, library = exported(thrown(), tmp_path, outputs=["ball.r", "ball.rd"], parameters=names)
+    run = library.start(1.0)
+    run["contacts.floor.mu"], run["contacts.floor.e"] = 0.1, 0.8
+    run.step_to(1.0)
+    scene = thrown()
+    scene.contacts["floor"].fields |= {"mu": 0.1, "e": 0.8}
+    result = dap.simulate(scene, t_end=1.0, dt=1.0)
+    expected = np.hstack([result.r[-1, 0], result.rd[-1, 0]])
+    assert np.array_equal(run.values(made.outputs), expected)
+
+
+def test_what_contacts_cannot_do_ends_the_run_with_their_name(tmp_path):
+    scene = door()
+    scene.bodies["door"].w, scene.bodies["door"].r_dot = (0, -1.0, 0), (0, 0, 0.5)
+    scene.add_function("a", "turn", coeff=(0.0, 1.0, 0.0))
+    scene.add_joint("drive-rot", "drive", joint="hinge", function="turn")
+    for name in ("rubs", "presses"):
+        del scene.forces[name]
+    _, library = exported(scene, tmp_path, outputs=["door.r"], method="lsq")
+    run = library.start(1.0)
+    for t in (1.0, 1.0):
+        with pytest.raises(dap.SimulationError, match=r"t = 0\.6 s: contact hinge_.* closes, and"):
+            run.step_to(t)

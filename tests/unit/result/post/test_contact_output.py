@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
+from support.internals import columns_of, dataset_to_write, names_of
 
 import dap3d_core as dap
 from dap3d_core.cli import main
 from dap3d_core.result import UnknownNameError
-from dap3d_core.result.quantities.csv_table import columns_of
-from dap3d_core.result.quantities.lookup import names_of
-from dap3d_core.result.quantities.netcdf_export import dataset_to_write
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +102,7 @@ def test_commands_take_results_whose_rows_are_those_of_contacts_alone(tmp_path, 
 
 def test_forces_are_unknown_where_velocities_jump(result):
     """Curves end before an impact and begin behind it: the state there is known, forces are not."""
-    from dap3d_core.result.post.smooth_parts import smooth_parts
+    from support.internals import smooth_parts
 
     before, behind = smooth_parts(result)
     for part, place in ((before, -1), (behind, 0)):

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from support.internals import smooth_parts
 from support.jumping import JUMPING
 
 import dap3d_core as dap
 from dap3d_core.plot import plot
-from dap3d_core.result.post.smooth_parts import smooth_parts
 
 G, V0 = 9.81, np.sqrt(2.0 * 9.81)
 

@@ -168,10 +168,14 @@ def test_the_layout_is_that_of_a_scene_file():
     )
 
 
-def test_a_folder_gets_a_scene_file_and_another_replaces_it_whole(tmp_path):
-    for scene in (dap.Scene(name="x", description="longer"), dap.Scene(name="y")):
-        assert scene.save(tmp_path) == tmp_path / "scene.toml"
-        assert dap.load(tmp_path) == scene
+def test_a_folder_gets_a_scene_file_and_another_replaces_it_whole_if_forced(tmp_path):
+    first, second = dap.Scene(name="x", description="longer"), dap.Scene(name="y")
+    assert first.save(tmp_path) == tmp_path / "scene.toml"
+    with pytest.raises(dap.SceneError, match="exists; force=True overwrites it"):
+        second.save(tmp_path)
+    assert dap.load(tmp_path) == first
+    second.save(tmp_path, force=True)
+    assert dap.load(tmp_path) == second
 
 
 def test_what_a_file_cannot_hold_is_refused_and_nothing_is_written(tmp_path):

@@ -2,7 +2,7 @@
 
 import tomllib
 
-from dap3d_core.scene.files.line_numbers import lines_of
+from support.internals import lines_of
 
 TEXT = '''\
 # a comment with [bodies.x] and "quotes

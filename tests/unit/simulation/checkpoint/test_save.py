@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 from support import mechanisms, problems, trees
 from support.ended import leave, shorten_chunks
-from support.internals import RadauState, store_reference_pivots
+from support.internals import RadauState, read_checkpoint, store_reference_pivots
 from support.levels import quickly
 from support.plain import jit_is_on, long_in_plain_python
 from support.results import same_bits
 
 import dap3d_core as dap
-from dap3d_core.simulation.checkpoint.save import read_checkpoint
 
 RUN = import_module("dap3d_core.simulation.run")
 

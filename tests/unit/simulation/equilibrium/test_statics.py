@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from support import at_rest
 from support.mechanisms import rough_four_bar
 from support.own_types import registry_of
@@ -131,9 +132,10 @@ def test_what_integrates_its_error_finds_the_pose():
 
 
 def test_bristles_at_rest_stay_bent():
-    """A rate that is zero at rest leaves the state as it was, and its force with it."""
+    """A rate that is zero at rest leaves the state as it was, and its force with it; a pose that
+    only a slide leads to is refused, for the slide would bend them."""
     scene = dap.Scene(name="stuck")
-    scene.add_body("block", mass=2.0, Jp=(1.0, 1.0, 1.0))
+    scene.add_body("block", mass=2.0, Jp=(1.0, 1.0, 1.0), r=(1e4 * 1e-4 / 100.0, 0.0, 0.0))
     law = {"f_n": 20.0, "mu_c": 0.3, "mu_s": 0.5, "v_s": 0.05, "sigma_0": 1e4}
     scene.add_force("lugre", "floor", P_i="block.O", a_j="ground.x", z_0=-1e-4, **law)
     scene.add_point("wall", "ground", (-1.0, 0.0, 0.0))
@@ -141,6 +143,64 @@ def test_bristles_at_rest_stay_bent():
     eq = dap.equilibrium(scene)
     assert eq.states == pytest.approx([-1e-4])
     assert eq.r[0, 0] == pytest.approx(1e4 * 1e-4 / 100.0, abs=1e-12)
+    scene.bodies["block"].r = (0.02, 0.0, 0.0)
+    with pytest.raises(dap.SimulationError, match=r"floor\.z .* keeps the way of the motion"):
+        dap.equilibrium(scene)
+
+
+def rod(**fields):
+    """A rod of 2 kg on a hinge about y, level at first, held by a tendon with an arm of 0.3 m."""
+    scene = dap.Scene(name="rod")
+    scene.add_body("rod", mass=2.0, Jp=(0.1, 0.1, 0.1), r=(0.5, 0.0, 0.0), **fields)
+    scene.add_point("pin", "rod", (-0.5, 0.0, 0.0))
+    scene.add_joint("rev", "hinge", P_i="pin", P_j="ground.O", a_i="rod.y", a_j="ground.y")
+    scene.add_force("weight", "gravity")
+    scene.add_force("joint_tendon", "tendon", movers=["rod"], holders=["ground"],
+                    axes=["ground.y"], coefs=[0.3], k=200.0, c=30.0)  # fmt: skip
+    return scene
+
+
+@long_in_plain_python
+def test_what_keeps_the_way_of_a_motion_is_refused():
+    """The length of a tendon on joints is a state. Held as at the start it pulled nowhere, and the
+    rod hung straight down, "stable". From the end of a damped run the pose is that of
+    m g / 2 cos(q) = k c^2 q, and the tendon's stiffness counts; along a path it is refused, too."""
+    with pytest.raises(dap.SimulationError, match=r"does not know tendon\.x where forces balance"):
+        dap.equilibrium(rod())
+    end = dap.simulate(rod(), t_end=60.0, dt=60.0)
+    eq = dap.equilibrium(rod(), start=end)
+    q = brentq(lambda q: WEIGHT / 2.0 * np.cos(q) - 200.0 * 0.3**2 * q, 0.0, 1.0)
+    assert eq.r[0] == pytest.approx((np.cos(q) / 2.0, 0.0, -np.sin(q) / 2.0), abs=1e-9)
+    assert eq.stable
+    with pytest.raises(dap.SimulationError, match=r"does not know tendon\.x where forces balance"):
+        dap.equilibrium_path(eq.scene(), "bodies.rod.mass", [2.0, 3.0])
+
+
+@long_in_plain_python
+def test_tendons_hold_what_would_fall():
+    """Two that pull against each other hold a rod upright, at rest as it is, where their stiffness
+    2 k c^2 is above m g / 2."""
+    for k, stable in ((70.0, True), (50.0, False)):
+        scene = rod()
+        scene.bodies["rod"].r, scene.bodies["rod"].p = (0, 0, 0.5), (0.5**0.5, 0, -(0.5**0.5), 0)
+        del scene.forces["tendon"]
+        for sign in (1.0, -1.0):
+            scene.add_force("joint_tendon", movers=["rod"], holders=["ground"], axes=["ground.y"],
+                            coefs=[sign * 0.3], k=k, length=-0.1)  # fmt: skip
+        assert dap.equilibrium(scene).stable is stable
+
+
+def test_a_motor_on_its_way_is_refused():
+    """A position that is set is not where the scene stands: its pace was given as one at rest."""
+    scene = rod()
+    del scene.forces["tendon"]
+    scene.add_input("angle", 0.5)
+    scene.add_joint("motor", "motor", joint="hinge", position="angle", lag=0.1)
+    with pytest.raises(dap.SimulationError, match="motor moves bodies to another position"):
+        dap.equilibrium(scene)
+    scene.inputs["angle"].value = 0.0
+    eq = dap.equilibrium(scene)
+    assert eq.reaction("motor")["i"].moment == pytest.approx((0.0, -WEIGHT / 2.0, 0.0), abs=1e-9)
 
 
 @pytest.mark.slow

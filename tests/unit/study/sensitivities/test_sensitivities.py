@@ -210,6 +210,15 @@ def test_what_derivatives_mean_is_noted():
                     v_s=0.05, sigma_0=2e4, sigma_1=50.0, sigma_2=1.0)  # fmt: skip
     (note,) = notes(scene, "forces.rub.mu_c")
     assert "forces.rub (lugre) has a law with branches or corners and no switch" in note
+    scene = dap.Scene(name="wheel")
+    scene.add_body("wheel", mass=2.0, Jp=(1.0, 1.0, 1.0), w=(0.0, 0.0, 6.0))
+    axle = {"P_i": "wheel.O", "P_j": "ground.O", "a_i": "wheel.z", "a_j": "ground.z"}
+    scene.add_joint("rev", "axle", **axle)
+    scene.add_force("rot_sda", "spring", joint="axle", k=0.3)
+    (note,) = notes(scene, "forces.spring.k")
+    assert "forces.spring (rot_sda) has a law with branches" in note  # it jumps at half a turn
+    scene.forces["spring"].fields["turns"] = True
+    assert not notes(scene, "forces.spring.k")
 
 
 def test_a_vector_has_no_elasticity():

@@ -1,6 +1,6 @@
 """The inverse of a small matrix, of the equations of normal forces."""
 
-from dap3d_core.assembly.arrays import Floats
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
 

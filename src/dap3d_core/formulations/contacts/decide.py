@@ -1,0 +1,358 @@
+"""What contacts do at an instant: which of them touch, collide, open, stick, slide from there on.
+
+One compiled function of arrays, which runs and exported models share. Bodies are in their own
+coordinates.
+"""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any
+
+from dap3d_core.assembly.arrays import System, velocity_offset
+from dap3d_core.assembly.evaluate import place, place_states
+from dap3d_core.assembly.metric import in_body_axes
+from dap3d_core.formulations import REPORT
+from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
+from dap3d_core.formulations.contacts.contact_table import (
+    FRICTION,
+    GAP,
+    NORMAL,
+    REACH,
+    find_grips,
+    put_outputs,
+)
+from dap3d_core.formulations.contacts.forces import put_slip_against, size_across
+from dap3d_core.formulations.contacts.impacts import AT_REST, collide, repeat_rounds, unjam
+from dap3d_core.formulations.contacts.loads import find_modes
+from dap3d_core.formulations.contacts.rows import (
+    add_scaled,
+    change,
+    lift,
+    move_on,
+    put_feels,
+    put_free,
+    put_rows,
+    unscale,
+)
+from dap3d_core.formulations.switches import POSITION_ROUNDING
+from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.linear.least_squares import factor_least, solve_least
+
+#: What an impulse changes where joints hold, as a part of what it does to free bodies: nothing.
+HELD = 1e-10
+#: Slip, m/s, that is stopped where it goes through zero.
+STOPPED = 1e-6
+#: Mobility of a slip, as a part of that of free bodies, below which it is the pose that stops it.
+DEAD = 1e-12
+#: Part of the longest column below which slips that are stopped depend on each other.
+DEPENDENT = 1e-12
+#: What was decided, or why nothing is: joints prescribe that a contact closes, friction jams,
+#: bodies overlap at the start.
+DECIDED, PRESCRIBED, JAMMED, OVERLAPS = 0, 1, 2, 3
+#: Places of a mode, the direction of sliding and the share among the states of elements.
+MODE, WAY, NEAR = 0, 1, 4
+
+
+@compiled
+def decide(
+    t: float, s: ContactArrays, system: System, loops: Any, functions: Any, tensions: Any
+) -> int:
+    """Decide at time t and the state ``y``, which becomes that from there on.
+
+    Args:
+        t, s: time; with y, what ``ended``, ``limit``, and what else is asked for.
+        system, loops, functions: of an evaluator in coordinates of bodies.
+        tensions: loops of what contacts say.
+
+    Returns:
+        DECIDED, or why nothing was, by ``culprit`` or the contacts that are among ``jams``.
+    """
+    report = functions[REPORT]
+    report(t, s.y, s.report, system, loops)
+    find_grips(t, s, system, tensions)
+    put_outputs(t, s.says, system.multipliers, system, tensions)
+    remember_modes(s, system)
+    if s.starts != 0 and find_overlap(s):
+        return OVERLAPS
+    put_rows(t, s, system, loops)
+    put_in_touch(s)
+    take_ended(s)
+    stop(s, system)
+    if not leave_movable(t, s, system, loops, functions):
+        return PRESCRIBED
+    put_opening(s)
+    collide(t, s, system, loops, functions)
+    move_on(t, s, system, loops)
+    find_grips(t, s, system, tensions)
+    if s.jammed >= 0:
+        for c in range(s.jams.shape[0]):
+            s.jams[c] = c == s.jammed
+    if s.jammed >= 0 or not find_modes_now(t, s, system, loops, functions):
+        if not unjam(s, system):
+            return blame(s)
+        move_on(t, s, system, loops)
+        find_grips(t, s, system, tensions)
+        for c in range(s.begins.shape[0]):
+            s.begins[c] = s.leaves[c] = 0
+        if not find_modes_now(t, s, system, loops, functions):
+            return blame(s)
+    settle(s, system)
+    put_state(s, system)
+    return DECIDED
+
+
+@compiled
+def blame(s: ContactArrays) -> int:
+    """Name the first contact that jams."""
+    for c in range(s.jams.shape[0]):
+        if s.jams[c] != 0:
+            s.culprit = c
+            return JAMMED
+    return JAMMED
+
+
+@compiled
+def repeat(t: float, s: ContactArrays, system: System, loops: Any, tensions: Any) -> None:
+    """What is kept as decided once more, at a state nearby: all follows smoothly.
+
+    Shares of what contacts carry stay: where they stick no motion depends on them.
+    """
+    place(t, s.y, system, loops)
+    find_grips(t, s, system, tensions)
+    remember_modes(s, system)
+    put_rows(t, s, system, loops)
+    stop(s, system)
+    repeat_rounds(s, system)
+    for c in range(s.mode.shape[0]):
+        s.role[c], s.values[c] = s.mode[c] > 0.5, s.closing[c]
+    lift(s)
+    change(s, system)
+    for k in range(s.moved.shape[0]):
+        s.moved[k] = 0.0
+    for c in range(s.mode.shape[0]):
+        size = size_across(s, c, s.slip[c])
+        if s.mode[c] == 1.0 and size > STOPPED * s.length[c]:
+            first = 0 if s.gapless[c] > 0.0 else 1
+            for k in range(3):
+                s.way[c, k] = 0.0
+                for i in range(first, 3):
+                    part = s.length[c] * s.slip[c, i] / size
+                    s.way[c, k] += part * s.frames[c, i, k]
+    put_state(s, system)
+
+
+@compiled
+def remember_modes(s: ContactArrays, system: System) -> None:
+    """Modes before the instant."""
+    place_states(s.y, system)
+    for c in range(s.state.shape[0]):
+        s.was[c] = system.states[s.state[c] + MODE]
+
+
+@compiled
+def find_overlap(s: ContactArrays) -> bool:
+    """True if the bodies of a contact overlap, which is ``culprit``."""
+    for c in range(s.state.shape[0]):
+        if s.says.found[c, REACH] >= 0.0 and s.says.found[c, GAP] < -s.limit[c]:
+            s.culprit = c
+            return True
+    return False
+
+
+@compiled
+def put_in_touch(s: ContactArrays) -> None:
+    """The contacts that touch; those whose surfaces have ended are not, and leave ``ended``.
+
+    Of those that hold what ends is the force, or the reach of their surfaces.
+    """
+    s.in_touch_count = 0
+    for c in range(s.state.shape[0]):
+        says = s.says.found[c]
+        if s.ended[c, 0] != 0 and s.was[c] > 0.5 and says[REACH] < says[NORMAL]:
+            s.ended[c, 0] = s.ended[c, 1] = 0
+            continue
+        is_near = says[GAP] < s.limit[c] and says[REACH] >= 0.0
+        if s.was[c] > 0.5 or is_near or s.ended[c, 0] != 0:
+            s.in_touch[s.in_touch_count] = c
+            s.in_touch_count += 1
+
+
+@compiled
+def take_ended(s: ContactArrays) -> None:
+    """Contacts that begin to slide, with directions, whose normal force vanishes, that stop."""
+    force = s.direction
+    for c in range(s.state.shape[0]):
+        s.begins[c] = s.stops[c] = 0
+        s.leaves[c] = s.ended[c, 0] != 0 and s.was[c] > 0.5
+        if s.ended[c, 1] == 0:
+            continue
+        if s.was[c] > 1.5:
+            friction = s.says.found[c][FRICTION:]
+            for i in range(3):
+                force[i] = 0.0
+                for k in range(3):
+                    force[i] += s.frames[c, i, k] * friction[k]
+            if size_across(s, c, force) > 0.0:
+                put_slip_against(s, c, force, s.begin_way[c])
+                s.begins[c] = 1
+        elif size_across(s, c, s.slip[c]) < STOPPED * s.length[c]:
+            s.stops[c] = 1
+
+
+@compiled
+def stop(s: ContactArrays, system: System) -> None:
+    """Stop slips, rounding of zero, without a change of what contacts hold in their modes.
+
+    At a dead centre it passes through zero while the mechanism moves on.
+    """
+    own, count, found = s.lam_free.shape[0], 0, False
+    for c in range(s.state.shape[0]):
+        is_stopped = False
+        if s.stops[c] != 0:
+            largest, of_free = 0.0, 0.0
+            for i in range(3 * c, 3 * c + 3):
+                square, row = 0.0, s.scaled[own + i]
+                for k in range(row.shape[0]):
+                    square += row[k] * row[k]
+                largest, of_free = max(largest, s.W[i, i]), max(of_free, square)
+            is_stopped = largest >= DEAD * of_free
+        for i in range(3):
+            if s.was[c] == 2.0 or is_stopped or (s.was[c] == 1.0 and i == 0):
+                across = is_stopped and (i > 0 or s.gapless[c] > 0.0)
+                s.rows[count] = 3 * c + i
+                s.right[count] = -s.slip[c, i] if across else 0.0
+                found |= s.right[count] != 0.0
+                count += 1
+    if not found:
+        return
+    for i in range(count):
+        for k in range(count):
+            s.B[i, k] = s.W[s.rows[i], s.rows[k]]
+    rank = factor_least(s.B, count, count, DEPENDENT, 0.0, s.w, s.order)
+    solve_least(s.B, count, count, rank, s.w, s.order, s.right, s.inner)
+    for k in range(count):
+        add_scaled(s.inner[k], s.moves[s.rows[k]], s.push)
+    change(s, system)
+
+
+@compiled
+def leave_movable(t: float, s: ContactArrays, system: System, loops: Any, functions: Any) -> bool:
+    """Leave in touch what joints let have an effect; what touches a body held does nothing.
+
+    False if one closes, ``culprit``, and joints prescribe that.
+    """
+    own, count = s.lam_free.shape[0], 0
+    for k in range(s.in_touch_count):
+        c = s.in_touch[k]
+        square, row, least = 0.0, s.scaled[own + 3 * c], -AT_REST * s.length[c]
+        for q in range(row.shape[0]):
+            square += row[q] * row[q]
+        if s.alone[c] != 0 or s.W[3 * c, 3 * c] > HELD * square:
+            s.in_touch[count] = c
+            count += 1
+            continue
+        put_free(t, s, system, loops, functions)
+        if s.slip[c, 0] < least or s.free[3 * c] < least:
+            s.culprit = c
+            return False
+    s.in_touch_count = count
+    return True
+
+
+@compiled
+def put_opening(s: ContactArrays) -> None:
+    """Contacts that have come to touch and open again."""
+    for c in range(s.state.shape[0]):
+        has_ended = s.ended[c, 0] != 0 or s.ended[c, 1] != 0
+        s.opening[c] = has_ended and s.was[c] < 0.5 and s.closing[c] > 0.0
+
+
+@compiled
+def find_modes_now(t: float, s: ContactArrays, system: System, loops: Any, functions: Any) -> bool:
+    """The modes of contacts in touch, at the present velocities; False if they jam."""
+    if s.in_touch_count > 0:
+        put_free(t, s, system, loops, functions)
+        put_feels(s)
+    for k in range(s.in_touch_count):
+        s.touching[k] = s.in_touch[k]
+    s.touching_count = s.in_touch_count
+    for c in range(s.state.shape[0]):
+        s.load[c] = s.alone[c]
+    return find_modes(s)
+
+
+@compiled
+def find_modes_at_rest(
+    t: float, s: ContactArrays, system: System, loops: Any, functions: Any, tensions: Any
+) -> bool:
+    """The modes of contacts in touch at the state ``y``; False if they jam."""
+    place(t, s.y, system, loops)
+    find_grips(t, s, system, tensions)
+    put_rows(t, s, system, loops)
+    for c in range(s.state.shape[0]):
+        s.begins[c] = s.leaves[c] = 0
+    return find_modes_now(t, s, system, loops, functions)
+
+
+@compiled
+def settle(s: ContactArrays, system: System) -> None:
+    """Let what holds rest: rates of gaps and gaps are zero then, and what overlaps parts.
+
+    What opens from rest, or opened already, would stop the run again where its gap is as deep as a
+    switch passes.
+    """
+    put_roles(s)
+    for c in range(s.state.shape[0]):
+        s.values[c], s.least[c] = s.closing[c], 0.0
+    lift(s)
+    change(s, system)
+    put_roles(s)
+    for c in range(s.state.shape[0]):
+        gap, rounding = s.says.found[c, GAP], POSITION_ROUNDING * s.length[c]
+        s.values[c], s.least[c] = gap if abs(gap) < s.limit[c] else 0.0, -2.0 * rounding
+        is_slow = s.closing[c] < AT_REST * s.length[c] or s.opening[c] != 0
+        if s.role[c] == 2 and is_slow and s.values[c] < -0.5 * rounding:
+            s.role[c] = 1
+    lift(s)
+    unscale(s, system)
+    for k in range(s.push.shape[0]):
+        s.moved[k], s.push[k] = s.push[k], 0.0
+
+
+@compiled
+def put_roles(s: ContactArrays) -> None:
+    """Contacts in touch that hold, and others."""
+    for c in range(s.state.shape[0]):
+        s.role[c] = 0
+    for k in range(s.in_touch_count):
+        c = s.in_touch[k]
+        s.role[c] = 1 if s.mode[c] > 0.5 else 2
+
+
+@compiled
+def put_state(s: ContactArrays, system: System) -> None:
+    """The state ``y`` from the instant on."""
+    y, n, work = s.y, system.body.shape[0] - 1, 0.0
+    for b in range(1, n + 1):
+        o, f, q = 6 * b - 6, velocity_offset(b, n), 7 * b - 7
+        for k in range(3):
+            y[f + k] += s.v[o + k] - s.v_before[o + k]
+            y[q + k] += s.moved[o + k]
+        w = in_body_axes(system.body[b], s.v[o + 3] - s.v_before[o + 3],
+                         s.v[o + 4] - s.v_before[o + 4],
+                         s.v[o + 5] - s.v_before[o + 5])  # fmt: skip
+        y[f + 3], y[f + 4], y[f + 5] = y[f + 3] + w[0], y[f + 4] + w[1], y[f + 5] + w[2]
+        turn, e0, e1, e2, e3 = s.moved[o + 3 : o + 6], y[q + 3], y[q + 4], y[q + 5], y[q + 6]
+        y[q + 3] -= 0.5 * (turn[0] * e1 + turn[1] * e2 + turn[2] * e3)
+        y[q + 4] += 0.5 * (e0 * turn[0] + turn[1] * e3 - turn[2] * e2)
+        y[q + 5] += 0.5 * (e0 * turn[1] + turn[2] * e1 - turn[0] * e3)
+        y[q + 6] += 0.5 * (e0 * turn[2] + turn[0] * e2 - turn[1] * e1)
+    first = y.shape[0] - 1 - system.states.shape[0]
+    for c in range(s.state.shape[0]):
+        k = first + s.state[c]
+        y[k + MODE] = s.mode[c]
+        for i in range(3):
+            y[k + WAY + i], y[k + NEAR + i] = s.way[c, i], s.near[c, i]
+        work += s.work[c]
+    y[y.shape[0] - 1] += work

@@ -1,0 +1,70 @@
+"""LLVM IR of a program to that of the program and its derivatives, by forward differentiation.
+
+Every float has a value, with the bits of the program alone, which decides branches, indices and
+iterations, and its derivatives by some directions, here called slopes. Slopes follow the chain rule
+one instruction at a time, so nothing need be known of what is computed: kernels of third parties,
+factorisation, projection and step control alike. Where a function has no derivative, slopes are
+zero where they would be infinite, and else those of the side that is computed.
+
+Code may say what differentiation by instructions does not know (``with_slopes``,
+``is_differentiated``, ``values_alone`` of intrinsics.py): these are lines with a remark.
+
+One, three, seven and fifteen slopes fill a vector with the value (within.py); others are a vector
+of their own, beside it (beside.py). What is fused is written so here, and not left to optimisation:
+the bits of slopes depend on the processor, but not on when code is optimised.
+
+The text is that of this compiler (writer.py, functions.py, trace.py), one instruction a line.
+Source: A. Griewank, A. Walther, Evaluating Derivatives, 2nd ed., SIAM 2008, chapter 3.
+"""
+
+import re
+from collections.abc import Iterator
+
+from dap3d_core.kernels.compiler.derivatives.beside import BesideWriter
+from dap3d_core.kernels.compiler.derivatives.instructions import PURE
+from dap3d_core.kernels.compiler.derivatives.within import WithinWriter
+from dap3d_core.kernels.compiler.lanes import rewritten
+
+#: Numbers for each float that fill vectors: a value and its slopes.
+_FILLING = (2, 4, 8, 16)
+
+
+def differentiate(text: str, count: int, *, is_fused: bool = False) -> str:
+    """A module of LLVM IR whose floats have ``count`` - 1 derivatives, in memory behind them.
+
+    Args:
+        text: of the module.
+        count: numbers for each float.
+        is_fused: products of slopes are added with one rounding, which is fast only on processors
+            that can (``has_fused_operations`` of objects.py).
+
+    Raises:
+        CompileError: it calls a function without a derivative.
+    """
+    if count in _FILLING:
+        lanes = count
+        lines = list(
+            rewritten(text, lambda external: WithinWriter(count, external, is_fused=is_fused))
+        )
+    else:
+        lanes = count - 1
+        lines = list(_beside(text, lanes, is_fused=is_fused))
+    called = set(re.findall(r"call double @(\w[\w.]*)\(", "\n".join(lines)))
+    declared = set(re.findall(r"^declare double @(\w[\w.]*)\(", text, re.MULTILINE))
+    for function in sorted(called - declared):
+        takes = "double, double" if function == "pow" else "double"
+        kind = "" if function.startswith("llvm.") else PURE
+        lines.append(f"declare double @{function}({takes}){kind}")
+    vector = f"<{lanes} x double>"
+    lines.append(f"declare {vector} @llvm.fma.v{lanes}f64({vector}, {vector}, {vector})")
+    return "\n".join([*lines, ""])
+
+
+def _beside(text: str, lanes: int, *, is_fused: bool) -> Iterator[str]:
+    """The lines of a module with slopes beside values."""
+    external = set(re.findall(r"^declare double @(\w[\w.]*)\(", text, re.MULTILINE))
+    for part in re.split(r"^(?=define )", text, flags=re.MULTILINE):
+        lines = part.splitlines()
+        writer = BesideWriter(lanes, external, lines, is_fused=is_fused)
+        for line in lines:
+            yield from writer.lines(line)

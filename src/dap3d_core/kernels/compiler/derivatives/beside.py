@@ -1,0 +1,253 @@
+"""Slopes beside values: a vector of slopes for each float, whose value stays a number.
+
+The instructions of the program stay as they are. An item of an array is followed by its slopes.
+Numbers that come of no array have no slopes, which are not computed then. A product that only a sum
+takes is added to its slopes without being made by itself.
+"""
+
+import re
+from collections import Counter
+
+from dap3d_core.kernels.compiler.derivatives.instructions import (
+    DOUBLE,
+    ONE,
+    RESULT,
+    Instructions,
+)
+from dap3d_core.kernels.compiler.types import CompileError
+from dap3d_core.kernels.compiler.writer import DIFFERENTIATED, SLOPES, VALUES
+
+_NUMBER = re.compile(r"double ([^\s,)]+)")
+_NAME = re.compile(r"%[\w.]+")
+_BINARY = re.compile(r"f(add|sub|mul|div) double (\S+), (\S+)")
+_SELECTED = re.compile(r"select i1 (\S+), double (\S+), double (\S+)( ; .*)?")
+_CALL = re.compile(r"(  )?call (.+?) ([@%][\w.]+)\((.*?)\)(.*)")
+_EXTRACTED = re.compile(r"extractvalue ({.*}) (\S+), (\d+)")
+_INSERTED = re.compile(r"insertvalue ({.*}) (\S+), (.*), (\d+)")
+_LOADED = re.compile(r"load double, ptr (%[\w.]+)")
+_STORED = re.compile(r"  store double (\S+), ptr (%[\w.]+)")
+_RETURNED = re.compile(r"  ret double (\S+)")
+#: Instructions of numbers whose results have no slopes, or are no numbers.
+_PLAIN = re.compile(r"(fcmp \w+|fptosi) double|[su]itofp ")
+
+
+class BesideWriter(Instructions):
+    """Rewrites the lines of one function."""
+
+    def __init__(self, lanes: int, external: set[str], lines: list[str], *, is_fused: bool) -> None:
+        """Args:
+        lanes: slopes of a float.
+        external, is_fused: as of ``Instructions``.
+        lines: of the function.
+        """
+        super().__init__(lanes, external, is_fused=is_fused)
+        self._pair = f"{{double, {self.vector}}}"
+        self._has_slopes = not any(line.endswith(VALUES) for line in lines)
+        #: Vectors of slopes by the names of numbers; those of others are zero.
+        self._slopes: dict[str, str] = {}
+        self._slots: set[str] = set()
+        #: What is known in the present block: numbers in slots, factors of products.
+        self._held: dict[str, str] = {}
+        self._products: dict[str, tuple[str, str]] = {}
+        #: How often names occur, once where they are defined.
+        self._occurs = Counter(word for line in lines for word in _NAME.findall(line))
+
+    def _zero_or(self, word: str) -> str:
+        return self._slopes.get(word, "zeroinitializer")
+
+    def _sum_of_product(
+        self, a: str, factors: tuple[str, str], *, is_negative: bool = False
+    ) -> str:
+        """Slopes a and those of a product, or less these; "" for zero."""
+        for x, factor in (factors, factors[::-1]):
+            if slopes := self._slopes.get(x):
+                a = self.total(a, slopes, factor, is_negative=is_negative)
+        return a
+
+    # ------------------------------------------------------------------ instructions
+
+    def lines(self, line: str) -> list[str]:
+        """The lines that take the place of one."""
+        self.out = []
+        found = RESULT.fullmatch(line)
+        name, text = found.groups() if found else ("", line)
+        if line.endswith(":"):
+            self._held, self._products, self._splats = {}, {}, {}
+            self.out.append(line)
+        elif line.startswith("define "):
+            self._define(line)
+        elif line.startswith("declare "):  # those of this compiler that give numbers are defined
+            is_own = line.startswith("declare void ")
+            self.out.append(
+                re.sub(r"\bdouble( %[\w.]+)?", rf"\g<0>, {self.vector}", line) if is_own else line
+            )
+        elif call := _CALL.fullmatch(text):
+            self._call(name, text, *call.groups()[1:])
+        elif text.endswith(DIFFERENTIATED):
+            self.out.append(f"  {name} = or i1 true, true")
+        elif "double" not in text or _PLAIN.match(text):
+            self.out.append(line)
+        elif text.startswith("getelementptr "):
+            self.out.append(DOUBLE.sub(f"[{self.lanes + 1} x double]", line))
+        elif not self._has_written(name, text, line):
+            raise CompileError(f"differentiation does not know {text}")
+        return self.out
+
+    def _has_written(self, name: str, text: str, line: str) -> bool:
+        if text.startswith("alloca "):
+            self._allocate(name, text, line)
+        elif found := _EXTRACTED.fullmatch(text):
+            self._extract(name, *found.groups())
+        elif found := _INSERTED.fullmatch(text):
+            self._insert(name, *found.groups())
+        elif found := _RETURNED.fullmatch(text):
+            one = self.new(f"insertvalue {self._pair} undef, double {found[1]}, 0")
+            two = self._with_slopes_of(found[1], one, "1")
+            self.out.append(f"  ret {self._pair} {two}")
+        elif text.startswith("  ret "):
+            self.out.append(DOUBLE.sub(self._pair, line))
+        else:
+            self.out.append(line)
+            return self._has_slopes_written(name, text)
+        return True
+
+    def _has_slopes_written(self, name: str, text: str) -> bool:
+        """Write slopes behind the instruction of a number."""
+        if found := _STORED.match(text):
+            self._store(*found.groups())
+        elif found := _LOADED.match(text):
+            self._load(name, found[1])
+        elif found := _BINARY.fullmatch(text):
+            kind, a, b = found.groups()
+            self._keep(name, getattr(self, f"_{kind}")(name, a, b))
+        elif text.startswith("fneg double "):
+            slopes = self._slopes.get(text.split()[-1])
+            self._keep(name, slopes and self.lanewise("fneg", slopes))
+        elif found := _SELECTED.fullmatch(text):
+            condition, a, b, remark = found.groups()
+            of = [self._zero_or(word) for word in (a, b)]
+            if remark == f" {SLOPES}":
+                self._keep(name, self._slopes.get(b))
+            elif of[0] != of[1]:
+                one, other = (f"{self.vector} {x}" for x in of)
+                self._keep(name, self.new(f"select i1 {condition}, {one}, {other}"))
+            else:
+                self._keep(name, self._slopes.get(a))
+        else:
+            return False
+        return True
+
+    def _keep(self, name: str, slopes: str | None) -> None:
+        if slopes and self._has_slopes:
+            self._slopes[name] = slopes
+
+    def _define(self, line: str) -> None:
+        line = re.sub(r"double (%[\w.]+)", rf"double \1, {self.vector} \1.d", line)
+        for name in re.findall(r"(%[\w.]+)\.d\b", line):
+            self._keep(name, f"{name}.d")
+        head, bracket, rest = line.partition("(")
+        self.out.append(DOUBLE.sub(self._pair, head) + bracket + rest)
+
+    def _allocate(self, name: str, text: str, line: str) -> None:
+        if text == "alloca double":
+            self._slots.add(name)
+            self.out += [line, f"  {name}.d = alloca {self.vector}"]
+        else:
+            self.out.append(DOUBLE.sub(f"[{self.lanes + 1} x double]", line))
+
+    def _place(self, at: str) -> str:
+        """Where the slopes of the number at an address are."""
+        if at in self._slots:
+            return f"{at}.d"
+        return self.new(f"getelementptr inbounds double, ptr {at}, i64 1")
+
+    def _load(self, name: str, at: str) -> None:
+        if at in self._held:
+            number = self._held[at]
+            self._keep(name, self._slopes.get(number))
+            if factors := self._fused(number):
+                self._products[name] = factors
+        elif self._has_slopes:
+            self._keep(name, self.new(f"load {self.vector}, ptr {self._place(at)}, align 8"))
+
+    def _store(self, word: str, at: str) -> None:
+        place, slopes = self._place(at), self._zero_or(word)
+        self.out.append(f"  store {self.vector} {slopes}, ptr {place}, align 8")
+        if at in self._slots:
+            self._held[at] = word
+
+    def _mul(self, name: str, a: str, b: str) -> str:
+        self._products[name] = a, b
+        return self._sum_of_product("", (a, b))
+
+    def _div(self, name: str, a: str, b: str) -> str:
+        """(a / b)' = (a' - (a / b) b') / b."""
+        slopes = self._slopes.get(a, "")
+        if by := self._slopes.get(b):
+            slopes = self.total(slopes, by, name, is_negative=True)
+        return slopes and self.lanewise("fmul", slopes, self.splat(self.number("fdiv", ONE, b)))
+
+    def _fused(self, word: str) -> tuple[str, str] | None:
+        """Factors of a product of which nothing else is made."""
+        is_one = self.is_fused and self._occurs[word] == 2
+        return self._products.get(word) if is_one else None
+
+    def _add(self, name: str, a: str, b: str) -> str:
+        if not self._fused(b):
+            a, b = b, a
+        before = self._slopes.get(a, "")
+        if factors := self._fused(b):
+            return self._sum_of_product(before, factors)
+        after = self._slopes.get(b, "")
+        return self.lanewise("fadd", before, after) if before and after else before or after
+
+    def _sub(self, name: str, a: str, b: str) -> str:
+        before, after = self._slopes.get(a, ""), self._slopes.get(b, "")
+        if factors := self._fused(b):
+            return self._sum_of_product(before, factors, is_negative=True)
+        if not before or not after:
+            return before or (after and self.lanewise("fneg", after))
+        if factors := self._fused(a):
+            return self._sum_of_product(self.lanewise("fneg", after), factors)
+        return self.lanewise("fsub", before, after)
+
+    # ------------------------------------------------------------------ calls, groups of numbers
+
+    def _group(self, type_: str) -> str:
+        return DOUBLE.sub(self._pair, type_)
+
+    def _with_slopes_of(self, word: str, group: str, place: str) -> str:
+        type_ = self._pair
+        return self.new(
+            f"insertvalue {type_} {group}, {self.vector} {self._zero_or(word)}, {place}"
+        )
+
+    def _extract(self, name: str, type_: str, group: str, k: str) -> None:
+        of = f"extractvalue {self._group(type_)} {group}, {k}"
+        is_number = type_[1:-1].split(", ")[int(k)] == "double"
+        self.out.append(f"  {name} = {of}{', 0' if is_number else ''}")
+        if is_number:
+            self._keep(name, self.new(f"{of}, 1"))
+
+    def _insert(self, name: str, type_: str, group: str, given: str, k: str) -> None:
+        type_, (kind, word) = self._group(type_), given.split()
+        if kind == "double":
+            group = self.new(f"insertvalue {type_} {group}, {given}, {k}, 0")
+            given, k = f"{self.vector} {self._zero_or(word)}", f"{k}, 1"
+        self.out.append(f"  {name} = insertvalue {type_} {group}, {given}, {k}")
+
+    def _call(self, name: str, text: str, type_: str, function: str, given: str, kind: str) -> None:
+        if function[0] == "@" and self.is_of_numbers(function[1:]):
+            self.out.append(f"  {name} = {text}")
+            words = _NUMBER.findall(given)
+            slopes = [self._slopes.get(word, "") for word in words]
+            self._keep(name, self.of_function(function[1:], name, words, slopes))
+            return
+        given = _NUMBER.sub(lambda x: f"{x[0]}, {self.vector} {self._zero_or(x[1])}", given)
+        call = f"call {self._group(type_)} {function}({given}){kind}"
+        if type_ == "double":
+            both = self.new(call)
+            self.out.append(f"  {name} = extractvalue {self._pair} {both}, 0")
+            self._keep(name, self.new(f"extractvalue {self._pair} {both}, 1"))
+        else:
+            self.out.append(f"  {name} = {call}" if name else f"  {call}")

@@ -1,0 +1,149 @@
+"""Checks of functions, of states of elements, and of normals and grips of contacts."""
+
+import random
+from collections.abc import Mapping
+
+import attrs
+import numpy as np
+
+from dap3d_core.interface.codegen.kernel_arguments import parameters
+from dap3d_core.testing.checks.compare import Comparison, body_words, rates
+from dap3d_core.testing.checks.findings import CheckOutcome
+from dap3d_core.testing.checks.forces import rigid_motion
+from dap3d_core.testing.samples.random_state import Direction
+from dap3d_core.testing.samples.sampled_type import UNDEFINED, SampledType
+
+# Texts of findings: formats of the wrong number x and of further words.
+_TANGENT = (
+    "row {x.n} of rate has another tangent than it seems: its derivative by {by} is {x.is_:.6g} by "
+    "complex step, which linearisation relies on, and {x.should:.6g} by differences"
+)
+_FRAME = (
+    "row {x.n} of rate notices where ground is: it was {x.should:.6g} and is {x.is_:.6g} after a "
+    "common {motion} of all bodies; a state is a number, or numbers along the axes of a body"
+)
+
+#: Arguments of each random function.
+ARGUMENTS = 8
+_WRONG = (
+    "{f} is wrong by {x.error:.3g} at x = {at:.6g}: it is {x.is_:.6g} and should be "
+    "{x.should:.6g}, the derivative of {g} ({way})"
+)
+#: Names of what functions of one argument, of two return; of each argument (derivative, of which).
+NAMES: tuple[str, ...] = ("f", "f'", "f''", "f'''")
+CHAIN: Mapping[str, tuple[tuple[int, int], ...]] = {"x": ((1, 0), (2, 1), (3, 2))}
+NAMES_OF_TWO = ("f", "f_x", "f_y", "f_xx", "f_xy", "f_yy")
+CHAIN_OF_TWO = {"x": ((1, 0), (3, 1), (4, 2)), "y": ((2, 0), (4, 1), (5, 2))}
+_WRONG_OF_TWO = (
+    "{f} is wrong by {x.error:.3g} at x = {at:.6g}, y = {and_at:.6g}: it is {x.is_:.6g} and should "
+    "be {x.should:.6g}, the derivative of {g} by {by} ({way})"
+)
+
+_LONG = "the normal is {x.is_:.6g} long; of another length than 1 forces, slip and gaps differ"
+#: Part of its speed at which slip is next to nothing, and tolerance of coefficients there.
+SLOW, CONTINUOUS = 1e-9, 1e-6
+_DRIVES = "grip gives {x.is_:.3g}: a negative coefficient of friction would drive"
+_NONE = "grip gives none along the grain, and {x.is_:.3g} across it; take a small one"
+_JUMPS = (
+    "grip jumps where slip begins: it gives {x.is_:.6g} at next to no speed and {x.should:.6g} at "
+    "none"
+)
+
+
+def tangent(subject: SampledType) -> CheckOutcome:
+    """The derivatives of the rates by the motion of the bodies and by the states."""
+    c = Comparison("rate", subject, "rate", "the tangent of rate against differences")
+    for name in _unread(subject):
+        c.note(f"no kernel but rate reads the state {name}: it changes no motion")
+    for sample in subject.samples:
+        slots, count = len(sample.kernels.type_info.layout.slots), len(sample.state.own)
+        along = [(Direction.of(slot, k), body_words(sample, slot, k))
+                 for slot in range(slots) for k in range(6)]  # fmt: skip
+        along += [(Direction.of_state(k, count), f"state {k + 1}") for k in range(count)]
+        for direction, by in along:
+            found = rates(sample, "rate", direction, c)
+            if len(found) > 1:  # else it takes no complex numbers, which is noted
+                step, difference = found
+                c.compare(sample, step.value, difference.value, _TANGENT, words={"by": by},
+                          tolerance=difference.tolerance, bound=difference.bound)  # fmt: skip
+    return c.outcome()
+
+
+def frame(subject: SampledType) -> CheckOutcome:
+    """A common rigid motion of all bodies leaves the rates as they are."""
+    c = Comparison("rate frame", subject, "rate", "a common rigid motion leaves the rates alone")
+    for k, sample in enumerate(subject.samples):
+        value = sample.value("rate")
+        for velocity in (False, True):
+            moved, _ = rigid_motion(sample.state, subject.seed, k, velocity=velocity)
+            try:
+                got = attrs.evolve(sample, state=moved).value("rate")
+            except UNDEFINED:
+                continue
+            if np.isfinite(got).all():
+                words = {"motion": "velocity" if velocity else "rigid motion"}
+                size = float(np.max(np.abs(value), initial=0.0))
+                c.compare(sample, got, value, _FRAME, words=words, scale=size)
+    return c.outcome()
+
+
+def _unread(subject: SampledType) -> list[str]:
+    """States that no kernel but ``rate`` reads."""
+    kernels = subject.type_info.kernels
+    read = {n for name, kernel in kernels.items() if name != "rate" for n in parameters(kernel)}
+    return [name for name in subject.type_info.layout.states if name not in read]
+
+
+def derivatives(subject: SampledType) -> CheckOutcome:
+    """Numbers that ``value`` returns are derivatives of others; f_xy is that of f_x and of f_y."""
+    what = "f', f'' and f''' against derivatives of f, f' and f''"
+    names, partial, text, of_two = NAMES, CHAIN, _WRONG, subject.type.arguments > 1
+    if of_two:
+        what = "partial derivatives against derivatives of f, f_x and f_y"
+        names, partial, text = NAMES_OF_TWO, CHAIN_OF_TWO, _WRONG_OF_TWO
+    c = Comparison("derivatives", subject, "value", what)
+    along = {"x": Direction.in_time(), "y": Direction.of_unknown(0, 1)}
+    for k, sample in enumerate(subject.samples):
+        rng = random.Random(f"{subject.seed} {k}")
+        for _ in range(ARGUMENTS):
+            x, y = rng.uniform(-0.5, 2.5), rng.uniform(-0.5, 2.5) if of_two else 0.0
+            state = attrs.evolve(sample.state, t=x)
+            if of_two:
+                state = attrs.evolve(state, unknowns=np.array([[y, 0.0]]))
+            here = attrs.evolve(sample, state=state)
+            value = here.value("value")
+            if not np.isfinite(value).all():
+                continue
+            for by, pairs in partial.items():
+                for rate in rates(here, "value", along[by], c):
+                    scale = float(np.max(np.abs([value[1:4], rate.value[:3]])))
+                    for k, of in pairs:
+                        words = {"f": names[k], "g": names[of], "at": x, "and_at": y, "by": by,
+                                 "way": rate.way}  # fmt: skip
+                        bound = None if rate.bound is None else rate.bound[of : of + 1]
+                        c.compare(here, value[k : k + 1], rate.value[of : of + 1], text,
+                                  words=words, tolerance=rate.tolerance, bound=bound, scale=scale,
+                                  rows=[k])  # fmt: skip
+    return c.outcome()
+
+
+def normal(subject: SampledType) -> CheckOutcome:
+    """The normal, or the axis of a moment, is a unit vector: J has it where the gap is."""
+    c = Comparison("normal", subject, "normal", "the normal is a unit vector")
+    part = slice(0, 3) if subject.type.at is not None else slice(3, 6)
+    for sample in subject.samples:
+        c.compare(sample, np.linalg.norm(sample.value("J")[0, :1, part], axis=1), 1.0, _LONG)
+    return c.outcome()
+
+
+def grip(subject: SampledType) -> CheckOutcome:
+    """Coefficients of friction are not negative, and continuous where slip begins."""
+    c = Comparison("grip", subject, "grip", "coefficients are not negative; those of slow slip")
+    for sample in subject.samples:
+        mu = sample.value("tension")[-4:]
+        slow = attrs.evolve(sample.state, v=SLOW * sample.state.v, w=SLOW * sample.state.w)
+        near = sample.value("tension", slow)[-4:]
+        c.compare(sample, np.minimum(mu, 0.0), 0.0, _DRIVES)
+        c.compare(sample, np.where(mu[::2] == 0.0, mu[1::2], 0.0), 0.0, _NONE)
+        c.compare(sample, near[:2], near[2:], _JUMPS, tolerance=CONTINUOUS)
+    return c.outcome()
