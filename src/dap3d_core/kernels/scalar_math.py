@@ -139,7 +139,7 @@ def mod(x, y):
 
 @intrinsic("with_slopes")
 def with_slopes(x: float, source: float) -> float:
-    """The number x; where code is differentiated (compiler/derivatives.py), with the derivatives of
+    """The number x; where code is differentiated (compiler/derivatives), with the derivatives of
     ``source``, for results of iterations that stop by their value. Those of a constant are zero.
     """
     return x

@@ -1,6 +1,6 @@
 """Derivatives of what a group loop computes, by the bodies of each instance.
 
-The compiled loop of a type runs in its differentiated form (kernels/compiler/derivatives.py), on
+The compiled loop of a type runs in its differentiated form (kernels/compiler/derivatives), on
 arrays in which each instance has bodies, functions, states and rows of its own. So any type has
 derivatives, a third party's too, exact to rounding. Twelve directions for each body an instance
 reads: its displacement, its rotation vector (global axes), its velocity, its angular velocity

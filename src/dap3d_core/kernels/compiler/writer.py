@@ -14,7 +14,7 @@ EXACT = ("sqrt", "fabs", "floor", "ceil", "rint")
 #: (nobuiltin): its own versions may round differently.
 LIBRARY = ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "asin", "acos", "atan",
            "atan2", "pow", "hypot", "nextafter")  # fmt: skip
-#: Remarks on lines that mean more where a program is differentiated (derivatives.py).
+#: Remarks on lines that mean more where a program is differentiated (derivatives).
 SLOPES, DIFFERENTIATED, VALUES = "; slopes", "; differentiated", "; values alone"
 
 

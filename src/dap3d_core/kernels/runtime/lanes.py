@@ -1,6 +1,6 @@
 """Compiled functions and arrays with a vector for each float: scenes, or a value and derivatives.
 
-Sources are those of one scene (kernels/compiler/lanes.py, derivatives.py). Scenes of one structure
+Sources are those of one scene (kernels/compiler/lanes.py, derivatives). Scenes of one structure
 are one in each lane, and have the bits of each alone; or lane 0 is a number, with the bits that it
 has alone, and the others are its derivatives. Item k of all lanes lies together.
 """

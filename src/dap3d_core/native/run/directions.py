@@ -1,6 +1,6 @@
 """Directional derivatives of an exported model, by the code of its run in differentiated form.
 
-Each number of the memory becomes a value and one slope (kernels/compiler/derivatives.py). So there
+Each number of the memory becomes a value and one slope (kernels/compiler/derivatives). So there
 is a second memory, of pairs: word k of the first is words 2 k and 2 k + 1 of it. Tables of
 addresses stand where those of the first would; integers are read from the first.
 """
