@@ -26,7 +26,7 @@ from dap3d_core.assembly.arrays import (
     step_functions,
 )
 from dap3d_core.assembly.evaluate import call_kinds, place_state
-from dap3d_core.assembly.motion.joint_angles import with_motions
+from dap3d_core.assembly.motion.coordinates import with_motions
 from dap3d_core.assembly.turns import ANGLE as AT_STEP
 from dap3d_core.assembly.turns import (
     COORDINATE,

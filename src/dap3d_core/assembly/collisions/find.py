@@ -1,10 +1,12 @@
-"""All points where the shapes of a model may touch at one pose."""
+"""All points where the shapes of a model may touch at one pose.
+
+Pairs that may touch come from a grid of cells, and of the few larger shapes one by one.
+"""
 
 import attrs
 import numpy as np
 
 from dap3d_core.assembly.collisions.boxes import CORNERS, boxes
-from dap3d_core.assembly.collisions.broad_phase import find_pairs
 from dap3d_core.assembly.collisions.convex import touch_convex
 from dap3d_core.assembly.collisions.placed_shapes import (
     POSE,
@@ -13,10 +15,16 @@ from dap3d_core.assembly.collisions.placed_shapes import (
     placed_shapes,
     with_room,
 )
-from dap3d_core.assembly.collisions.planes import at_plane
 from dap3d_core.assembly.collisions.records import GAP, NORMAL, POINT
-from dap3d_core.assembly.collisions.rods import balls, capsules, sphere_capsule
-from dap3d_core.assembly.collisions.solids import ball_box, capsule_box, sphere_cylinder
+from dap3d_core.assembly.collisions.solids import (
+    at_plane,
+    ball_box,
+    balls,
+    capsule_box,
+    capsules,
+    sphere_capsule,
+    sphere_cylinder,
+)
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.scene.contacts.collision_shapes import (
@@ -28,6 +36,146 @@ from dap3d_core.scene.contacts.collision_shapes import (
     SPHERE,
     CollisionShapes,
 )
+
+#: Part of the shapes that fit into a cell.
+FIT = 0.95
+#: The last cell along an axis, which all farther ones share.
+LAST = 1e9
+
+
+@compiled
+def find_pairs(s: PlacedShapes, bodies: int) -> None:
+    """Put the pairs whose balls overlap, or that may touch a plane; bodies: without ground."""
+    s.pair_count = 0
+    if s.solids.size > 1:
+        grid_pairs(s, bodies)
+    for p in range(s.planes.size):
+        plane = s.planes[p]
+        axes, c = s.axes[plane], s.centre[plane]
+        for k in range(s.solids.size):
+            i = s.solids[k]
+            d, height = s.centre[i], 0.0
+            for x in range(3):
+                height += (d[x] - c[x]) * axes[3 * x + 2]
+            if height <= s.reach[i] + s.near[i] + s.near[plane]:
+                add_pair(s, i, plane, bodies)
+
+
+@compiled
+def add_pair(s: PlacedShapes, i: int, j: int, bodies: int) -> None:
+    """Append a pair that is to meet; its count may be beyond the room."""
+    a, b = s.body[i], s.body[j]
+    if a == b or (s.bits[i, 0] & s.bits[j, 1] == 0 and s.bits[j, 0] & s.bits[i, 1] == 0):
+        return
+    key = min(a, b) * (bodies + 1) + max(a, b)
+    low, high = 0, s.apart.size
+    while low < high:
+        middle = (low + high) // 2
+        if s.apart[middle] < key:
+            low = middle + 1
+        else:
+            high = middle
+    if low < s.apart.size and s.apart[low] == key:
+        return
+    count = s.pair_count
+    if count < s.pairs.shape[0]:
+        s.pairs[count, 0], s.pairs[count, 1] = i, j
+    s.pair_count = count + 1
+
+
+@compiled
+def meet(s: PlacedShapes, i: int, j: int, bodies: int) -> None:
+    """Append a pair if its balls overlap."""
+    most, square = s.reach[i] + s.near[i] + (s.reach[j] + s.near[j]), 0.0
+    for k in range(3):
+        square += (s.centre[i, k] - s.centre[j, k]) * (s.centre[i, k] - s.centre[j, k])
+    if square <= most * most:
+        add_pair(s, i, j, bodies)
+
+
+@compiled
+def ranked(x: Floats, rank: int) -> float:
+    """The number of a rank among those of x, which are exchanged.
+
+    Source: Hoare, Algorithm 65: Find (Comm. ACM 4, 1961).
+    """
+    low, high = 0, x.size - 1
+    while low < high:
+        pivot, i, j = x[rank], low, high
+        while i <= j:
+            while x[i] < pivot:
+                i += 1
+            while pivot < x[j]:
+                j -= 1
+            if i <= j:
+                x[i], x[j] = x[j], x[i]
+                i, j = i + 1, j - 1
+        if j < rank:
+            low = i
+        if rank < i:
+            high = j
+    return x[rank]
+
+
+@compiled
+def place_of(x: int, y: int, z: int, size: int) -> int:
+    """Place of a cell in a table; cells may share it."""
+    return (x * 73856093 + y * 19349663 + z * 83492791) % size
+
+
+@compiled
+def fill_cells(s: PlacedShapes) -> tuple[int, int]:
+    """Sort the solids into those that fit into a cell, which are put there, and others; counts."""
+    count = s.solids.size
+    for k in range(count):
+        s.sorted[k] = s.reach[s.solids[k]] + s.near[s.solids[k]]
+    fit, small, large = ranked(s.sorted, int(FIT * (count - 1))), 0, 0
+    for k in range(count):
+        i = s.solids[k]
+        if s.reach[i] + s.near[i] <= fit:
+            s.small[small] = i
+            small += 1
+        else:
+            s.large[large] = i
+            large += 1
+    for c in range(3):
+        least = s.centre[s.small[0], c]
+        for k in range(small):
+            least = min(least, s.centre[s.small[k], c])
+        for k in range(small):
+            cell = (s.centre[s.small[k], c] - least) / (2.0 * fit)
+            s.cells[k, c] = 1 + int(min(cell, LAST))
+    for k in range(2 * small + 1):
+        s.head[k] = -1
+    for a in range(small):
+        at = place_of(s.cells[a, 0], s.cells[a, 1], s.cells[a, 2], 2 * small + 1)
+        s.following[a] = s.head[at]
+        s.head[at] = a
+    return small, large
+
+
+@compiled
+def grid_pairs(s: PlacedShapes, bodies: int) -> None:
+    """Append the pairs of solids whose balls overlap; those of ground ask for none."""
+    small, large = fill_cells(s)
+    cells = s.cells
+    for a in range(small):
+        i = s.small[a]
+        for near in range(27 if s.body[i] > 0 else 0):
+            x, y, z = cells[a, 0] + near // 9 - 1, cells[a, 1] + near // 3 % 3 - 1, near % 3 - 1
+            z += cells[a, 2]
+            b = s.head[place_of(x, y, z, 2 * small + 1)]
+            while b >= 0:
+                if cells[b, 0] == x and cells[b, 1] == y and cells[b, 2] == z:
+                    j = s.small[b]
+                    if s.body[j] == 0 or b > a:
+                        meet(s, i, j, bodies)
+                b = s.following[b]
+    for a in range(large):
+        for b in range(small):
+            meet(s, s.large[a], s.small[b], bodies)
+        for b in range(a + 1, large):
+            meet(s, s.large[a], s.large[b], bodies)
 
 
 @compiled

@@ -1,10 +1,169 @@
-"""Balls and capsules at boxes, balls at cylinders: nearest points of solids."""
+"""Points where spheres and capsules touch each other, boxes and cylinders, and shapes a plane.
+
+All of them by formulas: distances of points and line segments, nearest points of solids, and at a
+plane gaps of centres, ends, corners and rims.
+"""
 
 import math
 
 from dap3d_core.assembly.collisions.records import add
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.scene.contacts.collision_shapes import BOX, CAPSULE, CYLINDER, SPHERE
+
+#: Length of the part of a plane's normal across an axis below which a rim lies flat.
+FLAT = 1e-9
+
+
+@compiled
+def above(
+    which: Integers, found: Floats, count: int, i: int, j: int, feature: int,
+    x: float, y: float, z: float, radius: float, centre: Floats, axes: Floats, most: float,
+) -> int:  # fmt: skip
+    """A ball of shape i above plane j."""
+    o, a = centre[j], axes[j]
+    nx, ny, nz = a[2], a[5], a[8]
+    height = (x - o[0]) * nx + (y - o[1]) * ny + (z - o[2]) * nz
+    return add(which, found, count, i, j, feature, x - height * nx, y - height * ny,
+               z - height * nz, nx, ny, nz, height - radius, most)  # fmt: skip
+
+
+@compiled
+def at_plane(
+    which: Integers, found: Floats, count: int, i: int, j: int, kind: int,
+    centre: Floats, axes: Floats, size: Floats, most: float,
+) -> int:  # fmt: skip
+    """Shape i of a kind above plane j."""
+    d, u, radius = centre[i], axes[i], size[i, 0]
+    if kind == SPHERE:
+        return above(which, found, count, i, j, 0, d[0], d[1], d[2], radius, centre, axes, most)
+    if kind == CAPSULE:
+        for side in range(2):
+            s = size[i, 1] * (2.0 * side - 1.0)
+            x, y, z = d[0] + s * u[2], d[1] + s * u[5], d[2] + s * u[8]
+            count = above(which, found, count, i, j, side, x, y, z, radius, centre, axes, most)
+    if kind == BOX:
+        for corner in range(8):
+            a = size[i, 0] * (2.0 * (corner & 1) - 1.0)
+            b = size[i, 1] * (1.0 * (corner & 2) - 1.0)
+            c = size[i, 2] * (0.5 * (corner & 4) - 1.0)
+            x = d[0] + a * u[0] + b * u[1] + c * u[2]
+            y = d[1] + a * u[3] + b * u[4] + c * u[5]
+            z = d[2] + a * u[6] + b * u[7] + c * u[8]
+            count = above(which, found, count, i, j, corner, x, y, z, 0.0, centre, axes, most)
+    if kind == CYLINDER:
+        count = _rims(which, found, count, i, j, centre, axes, size, most)
+    return count
+
+
+@compiled
+def _rims(
+    which: Integers, found: Floats, count: int, i: int, j: int,
+    centre: Floats, axes: Floats, size: Floats, most: float,
+) -> int:  # fmt: skip
+    """Both rims of a cylinder: the lowest point of each, and three more a quarter turn apart."""
+    d, u, w = centre[i], axes[i], axes[j]
+    # the way down within the plane of a rim, in the axes of the cylinder
+    a = -(w[2] * u[0] + w[5] * u[3] + w[8] * u[6])
+    b = -(w[2] * u[1] + w[5] * u[4] + w[8] * u[7])
+    length = math.sqrt(a * a + b * b)
+    if length > FLAT:
+        a, b = a / length, b / length
+    else:
+        a, b = 1.0, 0.0
+    for side in range(2):
+        c = size[i, 1] * (2.0 * side - 1.0)
+        p, q = size[i, 0] * a, size[i, 0] * b
+        for k in range(4):
+            x = d[0] + p * u[0] + q * u[1] + c * u[2]
+            y = d[1] + p * u[3] + q * u[4] + c * u[5]
+            z = d[2] + p * u[6] + q * u[7] + c * u[8]
+            feature = 4 * side + k
+            count = above(which, found, count, i, j, feature, x, y, z, 0.0, centre, axes, most)
+            p, q = -q, p
+    return count
+
+
+#: Sine^2 of the angle between axes below which they are parallel.
+PARALLEL = 1e-12
+
+
+@compiled
+def balls(
+    which: Integers, found: Floats, count: int, i: int, j: int, feature: int,
+    x: float, y: float, z: float, ri: float, a: float, b: float, c: float, rj: float, most: float,
+) -> int:  # fmt: skip
+    """A ball of radius ri about (x, y, z), of shape i, and one of radius rj about (a, b, c)."""
+    nx, ny, nz = x - a, y - b, z - c
+    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    if length > 0.0:
+        nx, ny, nz = nx / length, ny / length, nz / length
+    else:
+        nx, ny, nz = 0.0, 0.0, 1.0
+    gap = length - ri - rj
+    return add(which, found, count, i, j, feature,
+               a + rj * nx, b + rj * ny, c + rj * nz, nx, ny, nz, gap, most)  # fmt: skip
+
+
+@compiled
+def along(x: float, y: float, z: float, d: Floats, u: Floats, half: float) -> float:
+    """Where on a segment about d, along u, is nearest to a point: from -half to half."""
+    s = (x - d[0]) * u[2] + (y - d[1]) * u[5] + (z - d[2]) * u[8]
+    return min(max(s, -half), half)
+
+
+@compiled
+def sphere_capsule(
+    which: Integers, found: Floats, count: int, i: int, j: int,
+    centre: Floats, axes: Floats, size: Floats, most: float,
+) -> int:  # fmt: skip
+    """Capsule i and sphere j."""
+    d, u, c = centre[i], axes[i], centre[j]
+    s = along(c[0], c[1], c[2], d, u, size[i, 1])
+    x, y, z = d[0] + s * u[2], d[1] + s * u[5], d[2] + s * u[8]
+    return balls(which, found, count, i, j, 0,
+                 x, y, z, size[i, 0], c[0], c[1], c[2], size[j, 0], most)  # fmt: skip
+
+
+@compiled
+def capsules(
+    which: Integers, found: Floats, count: int, i: int, j: int,
+    centre: Floats, axes: Floats, size: Floats, most: float,
+) -> int:  # fmt: skip
+    """Two capsules: their nearest points; of parallel ones the ends of what lies side by side."""
+    d, u, e, w = centre[i], axes[i], centre[j], axes[j]
+    hi, hj = size[i, 1], size[j, 1]
+    c = u[2] * w[2] + u[5] * w[5] + u[8] * w[8]
+    rx, ry, rz = e[0] - d[0], e[1] - d[1], e[2] - d[2]
+    p, q = rx * u[2] + ry * u[5] + rz * u[8], rx * w[2] + ry * w[5] + rz * w[8]
+    det = 1.0 - c * c
+    if det > PARALLEL:
+        s = min(max((p - c * q) / det, -hi), hi)
+        t = min(max(c * s - q, -hj), hj)
+        s = min(max(p + c * t, -hi), hi)
+        return _pair(which, found, count, i, j, 0, s, t, centre, axes, size, most)
+    low, high = max(-hi, p - hj), min(hi, p + hj)
+    if low >= high:  # end to end
+        s = hi if p > 0.0 else -hi
+        t = min(max(c * s - q, -hj), hj)
+        return _pair(which, found, count, i, j, 0, s, t, centre, axes, size, most)
+    count = _pair(which, found, count, i, j, 1, low, c * low - q, centre, axes, size, most)
+    return _pair(which, found, count, i, j, 2, high, c * high - q, centre, axes, size, most)
+
+
+@compiled
+def _pair(
+    which: Integers, found: Floats, count: int, i: int, j: int, feature: int, s: float, t: float,
+    centre: Floats, axes: Floats, size: Floats, most: float,
+) -> int:  # fmt: skip
+    """The balls at s and t of two capsules."""
+    d, u, e, w = centre[i], axes[i], centre[j], axes[j]
+    return balls(
+        which, found, count, i, j, feature,
+        d[0] + s * u[2], d[1] + s * u[5], d[2] + s * u[8], size[i, 0],
+        e[0] + t * w[2], e[1] + t * w[5], e[2] + t * w[8], size[j, 0], most,
+    )  # fmt: skip
+
 
 #: Feature of the point between the ends of a capsule.
 BETWEEN = 2

@@ -22,11 +22,11 @@ from dap3d_core.assembly.motion.joint_motion import (
     TRANSLATION,
     JointMotions,
     ModelMotions,
+    NamedAxes,
     Part,
     merged,
 )
 from dap3d_core.assembly.motion.joint_rows import JointRows
-from dap3d_core.assembly.motion.named_axes import NamedAxes
 from dap3d_core.assembly.motion.refusals import (
     DEPENDENT,
     NOT_CLOSED,

@@ -39,14 +39,16 @@ from dap3d_core.assembly.turns import report_turns
 from dap3d_core.formulations.common.friction import solve_with_friction
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.linear.ldlt.factor import (
+    add_product,
     assemble,
     factor,
     have_pivots,
     pivot_lengths,
     regularise,
+    scale_blocks,
+    solve_saddle,
     weigh_rows,
 )
-from dap3d_core.linear.ldlt.saddle_point import add_product, scale_blocks, solve_saddle
 
 #: e_i of regularised factors as part of the squared length of row i: far above rounding, and small
 #: enough that two passes leave nothing of a row that is a tenth independent of the others.

@@ -37,10 +37,11 @@ from dap3d_core.formulations.joint.node_layout import (
     SPHERICAL,
     WORK_WIDTH,
 )
-from dap3d_core.formulations.joint.reference import Reference, inertias_about
 from dap3d_core.formulations.joint.tree_nodes import (
     SEGMENTS,
+    Reference,
     TreeNodes,
+    inertias_about,
     tree_nodes,
     unsuitable_motion,
 )

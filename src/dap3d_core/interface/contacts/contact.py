@@ -223,7 +223,7 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
     # imported here: finding types by keyword does not need kernels
     from dap3d_core.interface.codegen.kernel_arguments import parameters
     from dap3d_core.interface.codegen.specialise import bound_kernel
-    from dap3d_core.interface.contacts import grips, loaded, rates, rows, turning
+    from dap3d_core.interface.contacts import grips, loaded, rates, rows
 
     names_of = [n for n in (*DECLARED, *OPTIONAL) if getattr(class_, n, None) is not None]
     declared = {name: getattr(class_, name) for name in names_of}
@@ -241,7 +241,7 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
         needed = dict.fromkeys(n for short in given for n in wanted.get(short, ()))
         return bound_kernel(kernel, given, needed, every)
 
-    special: dict[str, Any] = turning.KERNELS if "at" not in declared else {}
+    special: dict[str, Any] = rows.TURNING if "at" not in declared else {}
     if class_.load:
         special = loaded.kernels_of(calls, wanted, every, pushes=class_.pushes, has_j=has_j)
     elif "along" in declared:

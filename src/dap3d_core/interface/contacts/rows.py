@@ -23,6 +23,7 @@ APART = 1.0
 #: The same in time stepping, which leaves out what is as far apart.
 FAR_APART = 1e300
 _ZERO = (0.0, 0.0, 0.0)
+_NONE = row(_ZERO, _ZERO)
 
 
 def closed(mode):
@@ -254,3 +255,42 @@ def output_with_law(
         gap, reach, c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, mode, way, near
     )
     return (*known, *pair(mu), *pair(hold))
+
+
+def turning_blocks(n, mode):
+    """J of both bodies."""
+    u = where(closed(mode), n, _ZERO)
+    return (row(_ZERO, u), _NONE, _NONE), (row(_ZERO, neg(u)), _NONE, _NONE)
+
+
+def turning_gamma(n_dot, w_i, w_j, mode):
+    """-J_dot v."""
+    return where(closed(mode), -dot(n_dot, sub(w_i, w_j)), 0.0), 0.0, 0.0
+
+
+def moment(n, lam, mode, near):
+    """The moment along the normal, with what ``near`` gives."""
+    return where(closed(mode), lam[0] + dot(near, n), 0.0)
+
+
+def turning_friction(n, mode, near):
+    """What acts besides the row: ``near``, a moment here."""
+    given = where(closed(mode), scale(dot(near, n), n), _ZERO)
+    return (_ZERO, given), (_ZERO, neg(given))
+
+
+def turning_switch(gap, n, lam, mode, near):
+    """What ends a mode where it is negative: the gap, or the moment."""
+    return where(closed(mode), moment(n, lam, mode, near), gap), 1.0
+
+
+def turning_output(gap, n, lam, mode, near):
+    """As ``output``; the normal force is a moment, and there is no point of contact."""
+    return (gap, moment(n, lam, mode, near), *_ZERO, *_ZERO, *_ZERO, 1.0, *_ZERO)
+
+
+#: Of a contact whose gap is an angle: one row, of a moment about its normal. The two rows across
+#: stay zero, as those of a contact that slides.
+TURNING = {"C": position, "J": turning_blocks, "gamma": turning_gamma, "rate": rate,
+           "friction": turning_friction, "switch": turning_switch,
+           "tension": turning_output}  # fmt: skip

@@ -15,13 +15,16 @@ from warnings import catch_warnings
 
 import attrs
 
-from dap3d_core.interface.codegen import return_shapes
 from dap3d_core.interface.codegen.instance_layout import (
     InstanceLayout,
+    ShapeError,
     body_slots,
+    checked_shape,
+    entries,
     layout_of,
     size,
-    state_places,
+    state_entries,
+    value_at,
 )
 from dap3d_core.interface.codegen.kernel_arguments import (
     SLIP,
@@ -35,7 +38,6 @@ from dap3d_core.interface.codegen.kernel_arguments import (
 )
 from dap3d_core.interface.codegen.loop_source import JUMP_KINDS, jump_names, row_count
 from dap3d_core.interface.codegen.reactions import READING, reaction_names
-from dap3d_core.interface.codegen.return_shapes import ShapeError, checked_shape, value_at
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.contacts.contact import DECLARED
 from dap3d_core.interface.derive.derive import CannotDeriveError, derive, missing
@@ -157,11 +159,9 @@ def _output(
         try:
             value = kernel(*(random_quantity(q, rng) for q in quantities))
             if kernel_name in ("rate", "reset"):
-                paths = return_shapes.state_entries(
-                    value, [s for _, s in state_places(type_).values()]
-                )
+                paths = state_entries(value, type_)
             else:
-                paths = return_shapes.entries(value, *_expected(type_, kernel_name, value, rows))
+                paths = entries(value, *_expected(type_, kernel_name, value, rows))
         except ShapeError as error:
             raise PluginError(f"{who}: {error}") from None
         except Exception as error:

@@ -36,7 +36,7 @@ class Material:
 
 @attrs.frozen
 class Materials:
-    """The materials of a scene, read (contacts/read_materials.py).
+    """The materials of a scene, read (contacts/read_contacts.py).
 
     Attributes:
         by_name: name -> material, of numbers and words; None for what is not given, or wrong.

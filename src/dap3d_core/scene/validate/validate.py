@@ -138,7 +138,7 @@ def _read_materials(report: Collector) -> Materials:
     """The materials of a scene, those as well that nothing uses."""
     if not report.scene.materials:
         return Materials()
-    from dap3d_core.scene.contacts.read_materials import read_materials
+    from dap3d_core.scene.contacts.read_contacts import read_materials
 
     return read_materials(report)
 
@@ -216,7 +216,7 @@ def _check_shapes_and_outputs(
         read_outputs(report)
     if report.scene.collisions is None and not any(s.values.get("collides") for s in shapes):
         return None
-    from dap3d_core.scene.contacts.read_collisions import read_collisions
+    from dap3d_core.scene.contacts.read_contacts import read_collisions
 
     return read_collisions(report, shapes, bodies.body_index, joints, materials)
 

@@ -21,10 +21,9 @@ from dap3d_core.simulation.linearization.eigenvalues import (
     order_of,
 )
 from dap3d_core.simulation.linearization.frequency_response import response
-from dap3d_core.simulation.linearization.inputs import inputs_of
+from dap3d_core.simulation.linearization.inputs import inputs_of, output_derivatives
 from dap3d_core.simulation.linearization.mode_motion import mode_motion
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint, operating_point
-from dap3d_core.simulation.linearization.outputs import output_derivatives
 from dap3d_core.simulation.linearization.scaled_equations import ScaledEquations
 from dap3d_core.simulation.linearization.state_space import DriverRows, StateSpace, state_space
 from dap3d_core.simulation.linearization.steady_motion import independent_rows

@@ -1,4 +1,7 @@
-"""Joint coordinates: recovered from poses, their rates, signs and turns."""
+"""Joint coordinates: recovered from poses, their rates, signs and turns.
+
+The motions of a scene's joints are found once for each scene that has them.
+"""
 
 import numpy as np
 import pytest
@@ -6,6 +9,8 @@ from support.internals import Pose, classify, compose, inverse, relative, rotati
 from support.joint_pairs import BETWEEN, STANDARD, compiled_pair, pair
 from support.rotations import to_body
 
+import dap3d_core as dap
+from dap3d_core.assembly.motion import coordinates as motion_coordinates
 from dap3d_core.assembly.motion.coordinates import (
     aliases,
     coordinate_rates,
@@ -115,3 +120,32 @@ def test_coordinates_are_zero_in_the_reference_poses():
     np.testing.assert_allclose(coordinates(scene, scene.start), [[0.0]], atol=1e-15)
     np.testing.assert_allclose(coordinates(scene, given.start), [[0.8]], atol=1e-14)
     np.testing.assert_allclose(coordinates(given, scene.start), [[-0.8]], atol=1e-14)
+
+
+def motions(axis, mass=1.0):
+    """Those of a rod on a hinge about an axis."""
+    scene = dap.Scene()
+    scene.add_body("rod", mass=mass, Jp=(1.0, 1.0, 1.0))
+    scene.add_vector("axle", "rod", axis)
+    scene.add_vector("ground_axle", "ground", axis)
+    scene.add_joint("rev", "pin", P_i="rod.O", P_j="ground.O", a_i="axle", a_j="ground_axle")
+    return dap.compile(scene).evaluator.model.motions
+
+
+def test_the_same_scene_has_the_same_and_another_its_own():
+    """Another axis is another motion: the twist of a hinge turns about its axis."""
+    one = motions((0.0, 0.0, 1.0))
+    assert motions((0.0, 0.0, 1.0)) is one
+    assert motions((0.0, 0.0, 1.0), mass=2.0) is not one
+    other = motions((0.0, 1.0, 0.0))
+    for found, axis in ((one, 2), (other, 1)):
+        ((screws,),) = found.motions[0].screws[..., 3:]
+        np.testing.assert_allclose(np.abs(screws), np.eye(3)[axis], atol=1e-12)
+
+
+def test_few_are_kept(monkeypatch):
+    """Those found last: a process that compiles many scenes does not grow by each."""
+    monkeypatch.setattr(motion_coordinates, "KEPT", 3)
+    last = [motions((0.0, 0.0, 1.0), mass=10.0 + k) for k in range(5)][-1]
+    assert len(motion_coordinates._found) == 3
+    assert motions((0.0, 0.0, 1.0), mass=14.0) is last

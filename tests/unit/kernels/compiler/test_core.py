@@ -110,8 +110,10 @@ NOT_CALLED = {
         # of scenes with contacts, which have closed forms: verification/test_contacts.py
         # of shapes that collide: unit/assembly/collisions, verification/test_stepping.py
         "assembly.collisions.records": "add",
-        "assembly.collisions.solids": "clamp local put ball_box sphere_cylinder capsule_box slope "
-        "_lowest",
+        "assembly.collisions.solids": (
+            "clamp local put ball_box sphere_cylinder capsule_box slope _lowest "
+            "balls along sphere_capsule capsules _pair above at_plane _rims"
+        ),
         "assembly.collisions.boxes": "dot_axis apart boxes _edges _face _facing _clip",
         "assembly.collisions.supports": "radius_of put_global support curvature near_support",
         "assembly.collisions.distance": "dot _weigh _volume _holds_origin _reduce _scaled nearest",
@@ -120,12 +122,10 @@ NOT_CALLED = {
         "assembly.collisions.manifold": "turn outline clip tangents spread inside crossing "
         "at_plane_along put_points points_within",
         "assembly.collisions.placed_shapes": "place_shapes",
-        "assembly.collisions.rods": "balls along sphere_capsule capsules _pair",
-        "assembly.collisions.planes": "above at_plane _rims",
-        "assembly.collisions.broad_phase": (
-            "find_pairs add_pair meet ranked place_of fill_cells grid_pairs"
+        "assembly.collisions.find": (
+            "find_pairs add_pair meet ranked place_of fill_cells grid_pairs "
+            "has_formula touch find_touches"
         ),
-        "assembly.collisions.find": "has_formula touch find_touches",
         "integrators.moreau.matrix": (
             "is_factored assemble add_load add_pressed put_turned add_contact factor_square "
             "solve_square factor_blocks solve_blocks invert multiply take take_from factor "
