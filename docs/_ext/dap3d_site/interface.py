@@ -43,6 +43,14 @@ WORDS = {
     ),
     "Parts of numbers": ("abs", "sign", "floor", "mod", "minimum", "maximum"),
     "Branches, tables, lists": ("where", "lookup", "item", "root", "by_body"),
+    "Cables over points, drums and pulleys": (
+        "cable_spans",
+        "cable_length",
+        "cable_rate",
+        "cable_pulls",
+        "cable_bending",
+        "wrapped",
+    ),
     "For `prepare`": ("normals",),
 }
 

@@ -25,7 +25,7 @@ def test_the_map_has_every_folder_of_the_core():
         (re.match(r"`(\w+)`:", part) or re.match(r"`(\w+)`", first))[1] + "/" + name
         for first, _, last in cells
         for part in map(str.strip, last.split(";"))
-        for name in re.findall(r"`(\w+)`(?!:)", part)
+        for name in re.findall(r"`([\w/]+)`(?!:)", part)
     }
     found = {p.parent.relative_to(CORE).as_posix() for p in CORE.rglob("__init__.py")} - {"."}
     assert packages | folders == found

@@ -54,6 +54,7 @@ INSTALLED = {
     "rack": [ONE_ROW],
     "belt": ["refused: it joins three bodies"],
     "cable": ["refused: it joins three bodies"] * 4 + [ON_TIME] * 2,  # two lists each
+    "tendon": ["refused: it joins three bodies"] * 2,
     "follow": ["refused: it joins three bodies"] * 2,
     "point-on-plane": [ONE_ROW],
     "point-on-surface": [ONE_ROW],
