@@ -156,7 +156,7 @@ def {hook}():
 #: What is broken -> what stands in the module, and what ``dap3d plugins`` says of it.
 BROKEN = {
     "import-error": ({"imported": "no_such_package"}, "broken", "No module named 'no_such"),
-    "wrong-hook": ({"hook": "dap3d_force"}, "broken", "unknown hook 'dap3d_force'"),
+    "wrong-hook": ({"hook": "dap3d_force"}, "broken", "there is no hook dap3d_force"),
     "weight": ({}, "duplicate", "distribution dap3d 0.2.0"),
     "old-version": ({"version": "0"}, "broken", "written for interface version 0"),
     "not-compiled": ({"formula": "float('{}'.format(k))"}, "broken", "cannot be compiled"),

@@ -118,7 +118,7 @@ NOT_CALLED = {
         "assembly.collisions.supports": "radius_of put_global support curvature near_support",
         "assembly.collisions.distance": "dot _weigh _volume _holds_origin _reduce _scaled nearest",
         "assembly.collisions.convex": "gap_along unit cross attempt edges_of climb "
-        "bend flat_directions part_best touch_convex",
+        "bend flat_directions part_best own_faces touch_convex",
         "assembly.collisions.manifold": "turn outline clip tangents spread inside crossing "
         "at_plane_along put_points points_within",
         "assembly.collisions.placed_shapes": "place_shapes",
@@ -140,7 +140,10 @@ NOT_CALLED = {
             "put_declared velocity_of find_grips friction_at put_resistances put_resistance "
             "put_turning"
         ),
-        "integrators.moreau.free_motion": "add_pushed move_freely normalise size_of largest_rate",
+        "integrators.moreau.free_motion": (
+            "add_pushed move_freely normalise size_of largest_rate follow_states parts_of "
+            "put_mean_rates"
+        ),
         "integrators.moreau.impulses": (
             "slot_of recall put_grip let_slip remember mode_of keep_for_reports complete_row "
             "log_contacts"
@@ -151,8 +154,8 @@ NOT_CALLED = {
             "residual_of put_rest product_of solve_round try_pass"
         ),
         "integrators.moreau.reduced": (
-            "is_small put_felt solve_bodies meet_joints reduced_round solve_reduced aim_of "
-            "put_missing try_reduced"
+            "is_small factor_joints put_felt solve_bodies meet_joints reduced_round solve_reduced "
+            "aim_of put_missing try_reduced"
         ),
         "integrators.moreau.problem": (
             "prepare_problem take_carried felt_by solve judge sweep finish refine_groups "
@@ -180,7 +183,7 @@ NOT_CALLED = {
         "formulations.contacts.contact_table": "call_tension put_outputs find_grips",
         "formulations.contacts.decide": (
             "decide repeat remember_modes find_overlap put_in_touch take_ended stop leave_movable "
-            "put_opening find_modes_now find_modes_at_rest settle put_roles put_state"
+            "put_opening find_modes_now find_modes_at_rest settle put_roles put_state blame"
         ),
         "formulations.contacts.impacts": (
             "begin_problem put_impulses stop_slip collide take_part end_bounces remember_round act "
