@@ -30,7 +30,7 @@ from dap3d_core.simulation.events.jumps import LOSSLESS, MOST_RECORDS, Jumps, ro
 #: Gaps, m of a scene of ordinary size, below which bodies touch: in a run, and where it begins.
 TOUCHING, TOUCHING_AT_START = 1e-10, 1e-8
 #: Ends of modes within this part of the run: what changes more often comes to no end.
-MOST_CHANGES, WITHIN = 500, 1e-6
+MOST_CHANGES, WITHIN = 2000, 1e-4
 #: So many steps within this part of the run are too many: it would not come to an end.
 MOST_STEPS, SLOW = 10_000, 1e-5
 #: Records of changes from one mode to another.
