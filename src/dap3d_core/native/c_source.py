@@ -20,11 +20,14 @@ from dap3d_core.native.run.directions import Directions, PairEntry, PairUnit
 from dap3d_core.native.run.elements import Elements
 from dap3d_core.native.run.outputs import Output
 from dap3d_core.native.run.prepared import Advance, ContactCode, JumpCode, PreparedRun
+from dap3d_core.simulation.events import contact_jumps
 from dap3d_core.study.batch import initial_state
 
 KINDS = ("time", "input", "parameter", "output", "state", "derivative", "indicator", "fixed")
 #: Of these those that are parameters: set at any time, and before a run begins.
 PARAMETERS = ("parameter", "fixed")
+#: Limits of contact_jumps.py that the runtime has as well: gaps that touch; what comes to no end.
+LIMITS = ("TOUCHING", "TOUCHING_AT_START", "MOST_CHANGES", "WITHIN", "MOST_STEPS", "SLOW")
 
 
 @attrs.frozen
@@ -307,7 +310,8 @@ def _contacts(law: ContactCode, place: Callable[[Any], int]) -> list[str]:
     """The same of contacts that events follow."""
     s = law.arguments[0]
     names = ("y", "integer", "limit", "length", "ended", "switches")
-    numbers = {"JUMPS": 0, "CONTACTS": len(law.names)}
+    numbers: dict[str, Any] = {"JUMPS": 0, "CONTACTS": len(law.names)}
+    numbers |= {name: getattr(contact_jumps, name) for name in LIMITS}
     numbers |= {f"CONTACT_{name.upper()}": place(getattr(s, name)) for name in names}
     return [
         *_defined(numbers),

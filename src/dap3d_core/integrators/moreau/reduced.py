@@ -46,7 +46,7 @@ LESS, LEAST = 1e-2, 1.0
 
 @compiled
 def is_small(s: StepArrays) -> bool:
-    """True where the problem of contacts alone is the cheaper one."""
+    """True of so few contacts beside joints that their problem is solved alone."""
     return s.y.size > 0 and 3 * s.contact_count <= s.small_step.size
 
 

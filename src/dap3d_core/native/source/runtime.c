@@ -20,13 +20,6 @@ enum { RUNNING, FINISHED, STEP_FLOOR, NOT_FINITE, PROJECTION_FAILED, SWITCHED, C
        STIFF, JUMPED, STALLED, NO_ROOM };
 #define HORIZON 1e5
 #define ALIKE 1e-9
-/* As of contact_jumps.py: gaps that touch, in a run and at its start; what comes to no end. */
-#define TOUCHING 1e-10
-#define TOUCHING_AT_START 1e-8
-#define MOST_CHANGES 2000
-#define WITHIN 1e-4
-#define MOST_STEPS 10000
-#define SLOW 1e-5
 #define LARGEST 1e100
 enum { GOES_ON, OVER, FAILED }; /* is_over */
 
