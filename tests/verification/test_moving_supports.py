@@ -28,7 +28,11 @@ def table(driver, along, function, start):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_ball_rolls_round_a_turntable_at_two_sevenths_of_its_rate(method):
-    """v_dot = (2/7) W k x v of a solid ball, whatever its spin (Weltner, 1979)."""
+    """v_dot = (2/7) W k x v of a solid ball, whatever its spin (Weltner, 1979).
+
+    A normal that is vertical but for rounding gives radau no axes that change with it: of 1600
+    steps, as many as it refused, 89 were enough at 1e-8.
+    """
     rate, radius, x, v = 2.0, 0.1, 0.5, np.array([0.1, 0.3])
     turn = {"type": "a", "coeff": [0.0, rate, 0.0]}
     scene = table("drive-rot", "ground.z", turn, {"w": [0.0, 0.0, rate]})
@@ -42,6 +46,9 @@ def test_a_ball_rolls_round_a_turntable_at_two_sevenths_of_its_rate(method):
     s, c = np.sin(k * result.t), 1.0 - np.cos(k * result.t)
     path = np.stack([x + (v[0] * s - v[1] * c) / k, (v[0] * c + v[1] * s) / k], axis=1)
     np.testing.assert_allclose(result.r[:, 1, :2], path, rtol=0.0, atol=TOLERANCE)
+    implicit = dap.simulate(scene, t_end=3.0, method=method, integrator="radau", **TIGHT)
+    np.testing.assert_allclose(implicit.r[:, 1, :2], path, rtol=0.0, atol=TOLERANCE)
+    assert implicit.stats.rejected <= 0.1 * implicit.stats.steps
 
 
 @pytest.mark.parametrize("method", METHODS)
