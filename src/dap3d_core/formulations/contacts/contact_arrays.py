@@ -94,7 +94,8 @@ class ContactArrays(Arrays):
     ratio: Floats
     ratio_s: Floats
     e: Floats
-    length: Floats  # of the scene, m, and 1 of what turns
+    length: Floats  # (m,) of the scene, m
+    arm: Floats  # of what turns that length, which makes it slip; else 1
     gapless: Floats  # 1 where the first row is one of slip, and not along a normal
     newton: Integers  # 1 where the law of impact is Newton's
     alone: Integers  # 1 of friction without a gap: of joints

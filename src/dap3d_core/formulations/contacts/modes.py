@@ -256,9 +256,9 @@ def put_one(s: ContactArrays, k: int, shares: bool, least: float) -> None:
         s.force[c, i] = force[i]
         s.way[c, i] = s.near[c, i] = 0.0
         for q in range(3):
-            s.way[c, i] += s.length[c] * way[q] * s.frames[c, q, i]
+            s.way[c, i] += s.length[c] / s.arm[c] * way[q] * s.frames[c, q, i]
             if near and (sticks or (q == 0 and normal)):
-                s.near[c, i] += force[q] * s.frames[c, q, i]
+                s.near[c, i] += s.arm[c] * force[q] * s.frames[c, q, i]
 
 
 @compiled
