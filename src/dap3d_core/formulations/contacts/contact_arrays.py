@@ -80,6 +80,7 @@ class ContactArrays(Arrays):
     is_free = _integer()  # 1: ``free`` is of the present velocities
     starts = _integer()  # 1 at the start of a run
     jammed = _integer()  # a contact that has been found to jam, or -1
+    freed = _integer()  # how often impulses without a collision have ended a jam
     culprit = _integer()  # a contact with which no motion goes on
     round_count = _integer()  # of those kept
     exchanged = _real()  # J, sum of the magnitudes of work

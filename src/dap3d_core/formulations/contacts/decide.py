@@ -91,6 +91,7 @@ def decide(
     if s.jammed >= 0 or not find_modes_now(t, s, system, loops, functions):
         if not unjam(s, system):
             return blame(s)
+        s.freed += 1
         move_on(t, s, system, loops)
         find_grips(t, s, system, tensions)
         for c in range(s.begins.shape[0]):
