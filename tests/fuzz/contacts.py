@@ -194,10 +194,11 @@ def check_contacts(data: bytes) -> str:
         result = dap.simulate(scene, watch=watch, **SETTINGS)
     except dap.SimulationError as error:
         said, result = str(error), error.result
-    assert result is not None, said
-    names = result.contact_names
+    names = result.contact_names if result else scene.contacts
     words = next((w for w in ENDINGS if w in said), "")
     assert not said or (words and any(name in said for name in names)), said
+    if result is None:  # it jams where it begins
+        return words
     assert np.isfinite(result.u).all()
     energy = result.energy.total
     size = np.max(np.abs(result.energy.kinetic)) + 9.81 * len(scene.bodies)

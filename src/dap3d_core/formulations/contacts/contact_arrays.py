@@ -80,6 +80,7 @@ class ContactArrays(Arrays):
     is_free = _integer()  # 1: ``free`` is of the present velocities
     starts = _integer()  # 1 at the start of a run
     jammed = _integer()  # a contact that has been found to jam, or -1
+    freed = _integer()  # how often impulses without a collision have ended a jam
     culprit = _integer()  # a contact with which no motion goes on
     round_count = _integer()  # of those kept
     exchanged = _real()  # J, sum of the magnitudes of work
@@ -94,7 +95,8 @@ class ContactArrays(Arrays):
     ratio: Floats
     ratio_s: Floats
     e: Floats
-    length: Floats  # of the scene, m, and 1 of what turns
+    length: Floats  # (m,) of the scene, m
+    arm: Floats  # of what turns that length, which makes it slip; else 1
     gapless: Floats  # 1 where the first row is one of slip, and not along a normal
     newton: Integers  # 1 where the law of impact is Newton's
     alone: Integers  # 1 of friction without a gap: of joints

@@ -25,8 +25,9 @@ from dap3d_core.kernels.runtime.cache import compiled
 LOOSE = 1.0 - 1e-6
 #: Part of its mobility that friction leaves a contact whose steps become endless: it jams.
 NEARLY = 1e-2
-#: Part of the largest force that is to be left for a contact that stays as others can carry less.
-TO_STAY = 1e-6
+#: Part of the largest force that is to be left for a contact that stays as others can carry less;
+#: and for one that is at the end of its cone: with less it would be there again at once.
+TO_STAY, TO_STICK = 1e-6, 1e-3
 
 
 @compiled
@@ -109,6 +110,7 @@ def put_modes(s: ContactArrays) -> bool:
         if not put_matrix(s, False):
             return False
         if do_share(s) and hold_inside(s) and all_stay(s):
+            leave_few(s)
             return put_found(s, False, True, False)
         put_plain(s)
         if leaves == 0 and do_share(s):
@@ -128,6 +130,27 @@ def all_stay(s: ContactArrays) -> bool:
         if s.leaves[s.closed[k]] != 0 and not s.inner[3 * k] > TO_STAY * largest:
             return False
     return True
+
+
+@compiled
+def leave_few(s: ContactArrays) -> None:
+    """Let go of those at the end of their cones that carry next to nothing, where others hold."""
+    before, largest = s.closed_count, 0.0
+    for k in range(3 * before):
+        largest = max(largest, s.inner[k])
+    s.closed_count = 0
+    for k in range(before):
+        c = s.before[k] = s.closed[k]
+        if s.begins[c] == 0 or s.alone[c] != 0 or s.inner[3 * k] > TO_STICK * largest:
+            s.closed[s.closed_count] = c
+            s.closed_count += 1
+    if s.closed_count == before or (put_matrix(s, False) and hold_inside(s)):
+        return
+    for k in range(before):
+        s.closed[k] = s.before[k]
+    s.closed_count = before
+    put_matrix(s, False)
+    hold_inside(s)
 
 
 @compiled
@@ -256,9 +279,9 @@ def put_one(s: ContactArrays, k: int, shares: bool, least: float) -> None:
         s.force[c, i] = force[i]
         s.way[c, i] = s.near[c, i] = 0.0
         for q in range(3):
-            s.way[c, i] += s.length[c] * way[q] * s.frames[c, q, i]
+            s.way[c, i] += s.length[c] / s.arm[c] * way[q] * s.frames[c, q, i]
             if near and (sticks or (q == 0 and normal)):
-                s.near[c, i] += force[q] * s.frames[c, q, i]
+                s.near[c, i] += s.arm[c] * force[q] * s.frames[c, q, i]
 
 
 @compiled
