@@ -4,7 +4,7 @@
 # mypy: disable-error-code="no-any-return"
 
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
-from dap3d_core.formulations.contacts.forces import largest_entry, put_sizes, solve_forces
+from dap3d_core.formulations.contacts.forces import largest_entry, pressing, put_sizes, solve_forces
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.least_squares import factor_least, solve_least
 
@@ -112,7 +112,7 @@ def are_held_within(s: ContactArrays, part: int, least: int) -> bool:
         k = s.rows[q] // 3
         c = s.closed[k]
         own = max(A[3 * k, 3 * k], A[3 * k + 1, 3 * k + 1], A[3 * k + 2, 3 * k + 2])
-        carried = s.mu_s[c] * (x[3 * k] + s.load[c])
+        carried = s.mu_s[c] * pressing(s, k)
         rest = OF_REST * left * own * carried + RATE_ROUNDING * big
         if not abs(s.rates[s.rows[q]]) <= min(HELD * s.sizes[k], rest):
             return False
