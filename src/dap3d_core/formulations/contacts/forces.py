@@ -117,13 +117,16 @@ def add_sliding(s: ContactArrays) -> bool:
 
 
 @compiled
-def solve_forces(s: ContactArrays, part: float, tries: int, least: float = 0.0) -> bool:
+def solve_forces(
+    s: ContactArrays, part: float, tries: int, least: float = 0.0, resisting: float = 1.0
+) -> bool:
     """Forces of closed contacts into ``cone.x``, which is where it begins, and ``rates``.
 
     False where there are none; of fewer tries than all that is left open.
 
     part: of the cones; contacts that are ``slipping`` have mu, not mu_s.
     least: normal force of each, N.
+    resisting: the same part again of what resists rolling.
     """
     n, cone = 3 * s.closed_count, s.cone
     cone.count = s.closed_count
@@ -141,6 +144,7 @@ def solve_forces(s: ContactArrays, part: float, tries: int, least: float = 0.0) 
                 cone.b[i] += s.load[c] * row[0]
         mu = s.mu[c] if s.slipping[c] != 0 else s.mu_s[c]
         cone.mu[k] = 0.0 if s.slides[c] != 0 else part * mu
+        cone.mu[k] *= resisting if s.under[c] >= 0 else 1.0
         cone.more[k], cone.gapless[k], cone.ratio[k] = s.load[c], s.gapless[c], s.ratio_s[c]
         if least > 0.0 and s.alone[c] == 0:
             for i in range(n):

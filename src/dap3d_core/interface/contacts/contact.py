@@ -148,7 +148,7 @@ class Contact(Joint):
         """The coefficient of sticking friction where it is that of sliding, those of moments."""
         given: Any = self
         mu_s = given.mu if given.mu_s is None else given.mu_s
-        if not self.load:
+        if not self.load or self.resists:
             return {"mu_s": mu_s}
         arm = 1.0 if self.at is not None else given.radius
         return {"mu": arm * given.mu, "mu_s": arm * mu_s}
@@ -177,7 +177,7 @@ def _add_material(class_: type) -> None:
     if class_.is_smooth or alone:  # type: ignore[attr-defined]
         fields = {name: hidden(0.0) for name in ("e", "mu", "mu_s")}
         fields |= {} if alone else {"e": e}
-        if class_.load and class_.at is None:  # type: ignore[attr-defined]
+        if class_.load and class_.at is None and not class_.resists:  # type: ignore[attr-defined]
             fields["radius"] = hidden(1.0)
     if class_.grip is not None:  # type: ignore[attr-defined]
         unread = {"mu", "mu_s"} - set(signature(class_.grip).parameters)  # type: ignore[attr-defined]
