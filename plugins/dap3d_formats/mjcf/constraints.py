@@ -101,12 +101,8 @@ def _couple(reader: MjcfReader, element: XmlElement) -> None:
         _hold_sum(reader, element, "", {joint: 1.0}, a0)
         return
     _joint(reader, other, element.place)
-    if any(higher):
-        text = "an equality of joints with a polynomial of a higher degree"
-        reader.document.source.remarks.leave_out(element.place, text, motion=True)
-        return
-    name = element.get("name") or ""
-    reader.model.couplings.append(Coupling(name, joint, other, a1, a0, element.place))
+    name, curve = element.get("name") or "", (a0, a1, *higher) if any(higher) else ()
+    reader.model.couplings.append(Coupling(name, joint, other, a1, a0, element.place, curve))
 
 
 def _couple_by_tendon(reader: MjcfReader, element: XmlElement) -> None:

@@ -43,7 +43,7 @@ def length_range(reader: MjcfReader, line: Tendon) -> tuple[float, float]:
     def length(x: np.ndarray, sign: float) -> float:
         q = dict(zip(free, x.tolist(), strict=True))
         for one in leads.values():
-            q[one.joint] = one.offset + one.ratio * q.get(one.other, 0.0)
+            q[one.joint] = one.at(q.get(one.other, 0.0))
         poses = {WORLD: Frame()}
         return sign * length_of_line(line, lambda link: _pose(reader, link, q, poses))
 

@@ -54,11 +54,22 @@ def start_of(
         )
         for name, joint in model.joints.items()
     }
-    model = attrs.evolve(model, joints=joints)
+    couplings = [
+        one.tangent(_inside(joints[one.other], limited)) if couples(model, one) else one
+        for one in model.couplings
+    ]
+    model = attrs.evolve(model, joints=joints, couplings=couplings)
     start = _Start(model, remarks, limited)
     start.place(positions)
     start.move(rates)
     return model
+
+
+def _inside(joint: Joint, limited: bool) -> float:
+    """The coordinate of a joint that has one, within its limits where they hold."""
+    limits = joint.limits[0]
+    q = joint.position[0]
+    return min(max(q, limits.lower), limits.upper) if limited else q
 
 
 def _position(joint: Joint, given: Sequence[float] | None) -> tuple[float, ...]:
@@ -85,6 +96,13 @@ class _Start:
         start = {name: joint.position[0] for name, joint in joints.items() if joint.kind in SCALAR}
         for name, q in self._followed(start, given, "position").items():
             joints[name].position = (q,)
+        for one in (one for one in self.couplings if one.curve):
+            joints[one.joint].position = (one.at(joints[one.other].position[0]),)
+        couplings = self.model.couplings
+        couplings[:] = [
+            one.tangent(joints[one.other].position[0]) if couples(self.model, one) else one
+            for one in couplings
+        ]
         for name in self.locked:
             text = "limits that are equal hold a joint: it is fixed"
             self.remarks.translate(joints[name].place, text, motion=True)
@@ -107,8 +125,8 @@ class _Start:
                 ends = [joints.get(name) for name in (one.joint, one.other)]
                 kinds = [None if end is None else end.kind for end in ends]
                 if kinds[1] == "fixed" and kinds[0] in SCALAR:
-                    joint, q = one.joint, one.offset + one.ratio * _coordinate(joints[one.other])
-                elif kinds[0] == "fixed" and kinds[1] in SCALAR and one.ratio:
+                    joint, q = one.joint, one.at(_coordinate(joints[one.other]))
+                elif kinds[0] == "fixed" and kinds[1] in SCALAR and one.ratio and not one.curve:
                     joint, q = one.other, (_coordinate(joints[one.joint]) - one.offset) / one.ratio
                 else:
                     continue

@@ -48,6 +48,7 @@ class ContactTable:
         gapless: (m,) 1 where the first row is one of slip, and not along a normal; else 0.
         says, tensions: what they say of themselves, and the loops that find it.
         loads: contact -> rows of the joint whose load its friction has, and whether they push.
+        under: (m,) of what resists rolling the contact that presses, which is before it; else -1.
         mode, way, near: (m,), (m, 3), (m, 3) where each has them among the states of elements.
     """
 
@@ -61,6 +62,7 @@ class ContactTable:
         self.alone = np.zeros(self.count, dtype=bool)
         self.holds = np.ones((self.count, 3), dtype=bool)
         self.loads: dict[int, tuple[Integers, bool]] = {}
+        self.under: Integers = np.full(self.count, -1)
         self.newton = np.array([law == "newton" for law in model.contact_laws], dtype=bool)
         self.numbers = {name: np.zeros(self.count) for name in ("mu", "mu_s", "e")}
         self.movable = np.array(["#" not in name for name in self.names], dtype=bool)
@@ -74,7 +76,9 @@ class ContactTable:
             type_: Any = group.type_info.type
             self.turns[which], self.alone[which] = type_.at is None, type_.is_friction_alone()
             self.holds[which] = type_.holds
-            if group.loaded is not None:
+            if type_.resists:
+                self.under[which] = group.loaded - first
+            elif group.loaded is not None:
                 starts = model.joint_start[group.loaded][:, None] + type_.load
                 self.loads |= {int(c): (rows, type_.pushes)
                                for c, rows in zip(which, starts, strict=True)}  # fmt: skip
@@ -85,7 +89,7 @@ class ContactTable:
             q = next(q for q, (kind, g) in enumerate(evaluator.loop_groups)
                      if g is group and kind == "switch")  # fmt: skip
             loops.append(compiled_loop(group.type_info, "tension"))
-            width = WIDTH + LAW_WIDTH * (type_.grip is not None)
+            width = WIDTH + LAW_WIDTH * type_.has_law()
             groups.append([*evaluator.system.groups[q], width, len(order)])
             order += which.tolist()
         self.tensions: Any = loop_list(loops)
@@ -125,6 +129,7 @@ class ContactTable:
             "length": self.length * self.arm,
             "newton": self.newton.astype(np.int64),
             "alone": self.alone.astype(np.int64),
+            "under": self.under,
             "holds": self.holds.astype(np.int64),
             "state": self.mode,
             "frame_body": np.array([one[0] or one[1] for one in slots], dtype=np.int64),

@@ -279,7 +279,7 @@ def find_modes_now(t: float, s: ContactArrays, system: System, loops: Any, funct
         s.touching[k] = s.in_touch[k]
     s.touching_count = s.in_touch_count
     for c in range(s.state.shape[0]):
-        s.load[c] = s.alone[c]
+        s.load[c] = s.alone[c] if s.under[c] < 0 else 0
     return find_modes(s)
 
 

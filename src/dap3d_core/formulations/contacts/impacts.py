@@ -121,7 +121,8 @@ def take_part(s: ContactArrays, is_last: bool) -> bool:
     for k in range(s.in_touch_count):
         c = s.in_touch[k]
         bounces |= s.e_left[c] > 0.0
-        if s.closing[c] < -AT_REST * s.length[c]:
+        presses = s.under[c] if s.under[c] >= 0 else c
+        if s.closing[presses] < -AT_REST * s.length[presses]:
             s.touching[s.touching_count] = c
             s.touching_count += 1
     if s.touching_count > 0 and (is_last or not bounces):

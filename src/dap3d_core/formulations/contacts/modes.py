@@ -36,6 +36,8 @@ def put_closed(s: ContactArrays) -> None:
     count = 0
     for k in range(s.touching_count):
         c = s.touching[k]
+        if not is_pressed(s, c, s.kept, count):
+            continue
         if s.gapless[c] > 0.0 or s.slip[c, 0] < still_speed(s, c):
             s.kept[count] = c
             count += 1
@@ -43,6 +45,15 @@ def put_closed(s: ContactArrays) -> None:
     for c in range(s.mode.shape[0]):
         clear_mode(s, c)
         s.jams[c] = 0
+
+
+@compiled
+def is_pressed(s: ContactArrays, c: int, some: Integers, count: int) -> bool:
+    """True but of what resists rolling at a contact that is not among the first of some."""
+    found = s.under[c] < 0
+    for k in range(count):
+        found |= some[k] == s.under[c]
+    return found
 
 
 @compiled
@@ -175,7 +186,7 @@ def let_leave(s: ContactArrays, count: int) -> None:
         s.closed_count = 0
         for k in range(before):
             c = s.before[k]
-            if leaves[c] != 0:
+            if leaves[c] != 0 or not is_pressed(s, c, s.closed, s.closed_count):
                 s.gone[c] = 1
             else:
                 s.closed[s.closed_count] = c
@@ -212,7 +223,8 @@ def put_returning(s: ContactArrays, least: float) -> int:
             for k in range(without):
                 for i in range(3):
                     rate += s.W[3 * c, 3 * s.closed[k] + i] * s.cone.x[3 * k + i]
-            if rate < least:
+            resists = s.under[c] >= 0 and is_pressed(s, c, s.closed, count)
+            if rate < least or (without == 0 and resists):
                 if without == 0:
                     s.closed[count] = c
                     s.closed_count = count + 1
@@ -238,27 +250,31 @@ def put_found(s: ContactArrays, begins: bool, inner: bool, loose: bool) -> bool:
             s.cone.x[k], s.rates[k] = s.inner[k], 0.0
     elif not begin_to_move(s, LOOSE if loose else 1.0):
         return False
-    largest = 0.0
+    largest, count = 0.0, 0
     for k in range(3 * s.closed_count):
         largest = max(largest, abs(s.cone.x[k]))
     for k in range(s.closed_count):
-        put_one(s, k, shares, ZERO * largest)
+        count += s.cone.under[k] == k
+    for k in range(s.closed_count):
+        if s.under[s.closed[k]] < 0 or s.mode[s.under[s.closed[k]]] > 0.0:
+            put_one(s, k, shares, count == 1, ZERO * largest)
     if shares:
         leave_to_others(s)
     return True
 
 
 @compiled
-def put_one(s: ContactArrays, k: int, shares: bool, least: float) -> None:
+def put_one(s: ContactArrays, k: int, shares: bool, is_one: bool, least: float) -> None:
     """Put the mode of closed contact k, if it stays closed.
 
+    is_one: there is no other, but what resists rolling at it.
     least: friction, N, whose direction is not that of rounding.
     """
     c, force, rate = s.closed[k], s.cone.x[3 * k : 3 * k + 3], s.rates[3 * k : 3 * k + 3]
     alone, opens = s.alone[c] != 0, s.cone.A[3 * k, 3 * k] * force[0]
     if not alone and rate[0] > max(opens, 0.0):
         return
-    if s.closed_count == 1 and not alone and force[0] <= 0.0:
+    if is_one and not alone and force[0] <= 0.0:
         return
     way = s.direction
     way[0] = way[1] = way[2] = 0.0

@@ -177,6 +177,8 @@ def put_feels(s: ContactArrays) -> None:
             if abs(s.W[i, k]) > FELT * size[i] * size[k]:
                 s.feels[i // 3, k // 3] = 1
     for c in range(m):
+        if s.under[c] >= 0:
+            s.feels[c, s.under[c]] = s.feels[s.under[c], c] = 1
         for r in range(s.load_row[c], s.load_row[c] + s.load_count[c]):
             for k in range(n):
                 if abs(s.reaction[r, k]) > FELT * size[k] * s.unit[r]:

@@ -291,7 +291,7 @@ class ContactJumps(Jumps):
             self._note(c, t + float(s.rest_time[c]), "rest")
         for c in np.flatnonzero(s.was != s.mode).tolist():
             kind = CHANGES.get((int(s.was[c]), int(s.mode[c])), "")
-            if kind and (s.was[c] or not table.alone[c]):
+            if kind and ((s.was[c] and s.mode[c]) or not table.alone[c]):
                 self._note(c, t, kind, u)
 
     def _refuse(self, t: float, failure: int) -> None:
