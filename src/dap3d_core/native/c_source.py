@@ -309,7 +309,7 @@ def _jumps(prepared: PreparedRun) -> list[str]:
 def _contacts(law: ContactCode, place: Callable[[Any], int]) -> list[str]:
     """The same of contacts that events follow."""
     s = law.arguments[0]
-    names = ("y", "integer", "limit", "length", "ended", "switches")
+    names = ("y", "integer", "limit", "length", "arm", "ended", "switches")
     numbers: dict[str, Any] = {"JUMPS": 0, "CONTACTS": len(law.names)}
     numbers |= {name: getattr(contact_jumps, name) for name in LIMITS}
     numbers |= {f"CONTACT_{name.upper()}": place(getattr(s, name)) for name in names}

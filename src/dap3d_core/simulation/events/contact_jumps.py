@@ -71,7 +71,7 @@ class ContactJumps(Jumps):
         #: The next instant has what is kept as decided.
         self.repeats = False
         self._stood = (0, -np.inf)
-        self._latest: deque[tuple[float, str]] = deque(maxlen=MOST_CHANGES)
+        self._latest: deque[tuple[float, str, int]] = deque(maxlen=MOST_CHANGES)
 
     @cached_property
     def arrays(self) -> ContactArrays:
@@ -170,15 +170,22 @@ class ContactJumps(Jumps):
     def _refuse_endless(self, integration: Integration, names: list[str]) -> None:
         """SimulationError where changes of contacts follow each other ever faster."""
         latest, t = self._latest, integration.t
-        latest.append((t, ", ".join(names)))
+        latest.append((t, ", ".join(names), self.arrays.freed))
         passed = t - latest[0][0]
         if len(latest) < MOST_CHANGES or passed > WITHIN * self._span_of(integration):
             return
-        every = sorted({name for _, some in latest for name in some.split(", ")})
+        every = sorted({name for _, some, _ in latest for name in some.split(", ")})
+        start = f"the run stopped at t = {t:.9g} s: contacts {', '.join(every)}"
+        if freed := self.arrays.freed - latest[0][2]:
+            raise SimulationError(
+                f"{start} rattle: slip jams again and again, {freed} times within {passed:.2g} s, "
+                "and each time an impulse sets it free and lifts bodies that fall back at once. "
+                "Smaller mu of these contacts, or the law of their slip, ends that"
+            )
         raise SimulationError(
-            f"the run stopped at t = {t:.9g} s: contacts {', '.join(every)} changed "
-            f"{MOST_CHANGES} times within {passed:.2g} s, ever faster. Smaller e of these contacts "
-            "ends bounces sooner (e = 0: at once); or end the run by an event before"
+            f"{start} changed {MOST_CHANGES} times within {passed:.2g} s, ever faster. Smaller e "
+            "of these contacts ends bounces sooner (e = 0: at once); or end the run by an event "
+            "before"
         )
 
     def notes(self, integration: Integration) -> list[str]:
@@ -281,7 +288,7 @@ class ContactJumps(Jumps):
             self._note(c, t + float(s.rest_time[c]), "rest")
         for c in np.flatnonzero(s.was != s.mode).tolist():
             kind = CHANGES.get((int(s.was[c]), int(s.mode[c])), "")
-            if kind and (s.was[c] or not table.alone[c]):
+            if kind and ((s.was[c] and s.mode[c]) or not table.alone[c]):
                 self._note(c, t, kind, u)
 
     def _refuse(self, t: float, failure: int) -> None:
