@@ -49,3 +49,9 @@ def test_force_of_a_muscle_by_its_acceleration(tmp_path):
     assert not [one for one in report.left_out if one.motion]
     (peak,) = [f.fields["peak"] for f in scene.forces.values() if "peak" in f.fields]
     assert peak == pytest.approx(2.0 * 50.0 / 0.4, rel=1e-12)
+
+
+def test_points_of_a_tendon_in_one_place_are_refused(tmp_path):
+    text = BALLS.replace('pos="0 0 1"', 'pos="0 0 2"')
+    with pytest.raises(dap.SceneError, match="tendon own: two points that follow each other"):
+        imported(tmp_path / "a.xml", text)
