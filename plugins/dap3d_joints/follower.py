@@ -53,7 +53,7 @@ class Follower(Joint):
     bends: tuple = numbers(3, (0.0, 0.0, 0.0), doc="of the ratio with the angle of the wheel")
 
     def J(a_j, a_k, ratio):
-        return row(ZERO, a_j), row(ZERO, neg(a_j)), row(ZERO, scale(-ratio, a_k))
+        return turning(a_j, a_k, ratio)
 
     def gamma(a_j_dot, a_k_dot, w_i, w_j, w_k, ratio):
         return ratio * dot(a_k_dot, w_k) - dot(a_j_dot, sub(w_i, w_j))
@@ -67,8 +67,7 @@ class Curved(Follower, curved=True, along=False):
         return {"n_k": n, "m_k": m, "zero": bodies["k"].to_global(n)}
 
     def J(a_j, a_k, n_k, m_k, zero, ratio, bends):
-        now, _ = ratio_at(n_k, m_k, zero, ratio, bends)
-        return row(ZERO, a_j), row(ZERO, neg(a_j)), row(ZERO, scale(-now, a_k))
+        return turning(a_j, a_k, ratio_at(n_k, m_k, zero, ratio, bends)[0])
 
     def gamma(a_j_dot, a_k, a_k_dot, n_k, m_k, zero, w_i, w_j, w_k, ratio, bends):
         now, slope = ratio_at(n_k, m_k, zero, ratio, bends)
@@ -81,9 +80,7 @@ class CurvedSliding(Curved, curved=True, along=True):
     """The ratio changes, and body i slides."""
 
     def J(a_j, a_k, n_k, m_k, zero, ratio, bends, r_i, r_j):
-        now, _ = ratio_at(n_k, m_k, zero, ratio, bends)
-        arm = cross(sub(r_i, r_j), a_j)
-        return row(a_j, ZERO), row(neg(a_j), neg(arm)), row(ZERO, scale(-now, a_k))
+        return sliding(a_j, a_k, ratio_at(n_k, m_k, zero, ratio, bends)[0], r_i, r_j)
 
     def gamma(a_j, a_j_dot, a_k, a_k_dot, n_k, m_k, zero, r_i, r_j, v_i, v_j, w_j, w_k, ratio,
               bends):  # fmt: skip
@@ -97,12 +94,22 @@ class Sliding(Follower, along=True):
     """Body i slides along the axis."""
 
     def J(a_j, a_k, ratio, r_i, r_j):
-        arm = cross(sub(r_i, r_j), a_j)
-        return row(a_j, ZERO), row(neg(a_j), neg(arm)), row(ZERO, scale(-ratio, a_k))
+        return sliding(a_j, a_k, ratio, r_i, r_j)
 
     def gamma(a_j, a_j_dot, a_k_dot, r_i, r_j, v_i, v_j, w_j, w_k, ratio):
         slide = sliding_gamma(a_j, a_j_dot, r_i, r_j, v_i, v_j, w_j)
         return ratio * dot(a_k_dot, w_k) - slide
+
+
+def turning(a_j, a_k, ratio):
+    """The row of bodies that turn."""
+    return row(ZERO, a_j), row(ZERO, neg(a_j)), row(ZERO, scale(-ratio, a_k))
+
+
+def sliding(a_j, a_k, ratio, r_i, r_j):
+    """The row of a body that slides."""
+    arm = cross(sub(r_i, r_j), a_j)
+    return row(a_j, ZERO), row(neg(a_j), neg(arm)), row(ZERO, scale(-ratio, a_k))
 
 
 def ratio_at(n, m, zero, ratio, bends):

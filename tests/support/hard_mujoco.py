@@ -54,12 +54,13 @@ class HardOracle(Oracle):
         m, d = self.model, self.data
         if key is not None:
             mujoco.mj_resetDataKeyframe(m, d, key)
+        activations = d.act.copy()
         self._soften((0.004, 1.0), IMPEDANCES[1])
         m.opt.iterations, m.opt.noslip_iterations = 50, 0
         for _ in range(round(time / m.opt.timestep)):
             mujoco.mj_step(m, d)
         m.opt.iterations, m.opt.noslip_iterations = 500, 200
-        d.qvel[:], found = 0.0, []
+        d.qvel[:], d.act[:], found = 0.0, activations, []
         m.opt.ccd_tolerance, m.opt.ccd_iterations = 1e-12, 200
         self._soften((-1e-9, -1e-9), IMPEDANCES[1])
         self._move_apart()
