@@ -60,7 +60,7 @@ def keep_unoptimised():
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
     """Of the cases of a verification the quick tests take the first, of `every(n)` each n-th, of
-    any other test that has more than five each third. Of those that they leave CI verifies all, of
+    any other test that has more than five each fifth. Of those that they leave CI verifies all, of
     `thinned(n)` one of n, without order: each n-th would have the same value of some parameter."""
     cases = defaultdict(list)
     for item in items:
@@ -73,7 +73,7 @@ def pytest_collection_modifyitems(items):
         elif "/verification/" in found[0].path.as_posix():
             n = len(found)
         else:
-            n = 3 if len(found) > 5 else 1
+            n = 5 if len(found) > 5 else 1
         for k, item in enumerate(found):
             if k % n:
                 item.add_marker("slow")

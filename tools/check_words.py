@@ -45,7 +45,7 @@ NAMES = {
 #: Definitions of such names that are right -> why.
 ALLOWED = {
     ("src/dap3d_core/interface/fields.py", "choice"): "the maker of fields of types",
-    ("src/dap3d_core/cli/process/signals.py", "AGAIN"): "seconds between two signals",
+    ("src/dap3d_core/cli/framework/command.py", "AGAIN"): "seconds between two signals",
     ("src/dap3d_core/registry/guard.py", "AGAIN"): "seconds between two signals",
 }
 #: Files of these names -> what they are called now.

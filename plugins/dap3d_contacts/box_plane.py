@@ -1,6 +1,6 @@
 """The eight corners of a box at a plane."""
 
-from dap3d_core.interface import Contact, Point, Vector, hookimpl, point, vec3, vector
+from dap3d_core.interface import Body, Contact, Point, Vector, body, hookimpl, point, vec3, vector
 from dap3d_core.kernels import add, dot, sub
 
 interface_version = 1
@@ -17,7 +17,8 @@ class BoxPlane(Contact):
 
     keyword, points = "box_plane", 8
     body_axes = ("i",)
-    P_i: Point = point(doc="centre of the box")
+    body_i: Body = body(default=None, doc="body that carries the box")
+    P_i: Point = point(default=None, doc="centre of the box; the mass centre when left out")
     size: tuple = vec3(unit="m", doc="lengths of its edges, along the axes of the body")
     P_j: Point = point("ground.O", doc="point of the plane")
     a_j: Vector = vector("ground.z", doc="normal of the plane, towards the box")

@@ -27,7 +27,7 @@ from dap3d_core.simulation.checkpoint.save import read_checkpoint
 
 runs = import_module("dap3d_core.simulation.run")
 runs.CHUNK_SECONDS, runs.FIRST_CHUNK = 1e-3, 100
-import_module("dap3d_core.simulation.output.recorder").SHORT_SECONDS = 0.05
+import_module("dap3d_core.simulation.run_state").SHORT_SECONDS = 0.05
 SETTINGS = {"t_end": 6.0, "dt": 0.02}
 compiled = dap.compile("pen1")
 whole = dap.simulate(compiled, **SETTINGS)

@@ -38,11 +38,11 @@ class BareOracle(Oracle):
                 m.actuator_gear[k] = 0.0
         for array in (m.body_gravcomp, m.tendon_stiffness, m.tendon_damping, m.tendon_armature):
             array[:] = 0.0
-        for j in range(m.njnt):  # a ball's armature, and all of a free joint, are left out
+        for j in range(m.njnt):  # what a ball or free joint has but damping is left out
             start, size = m.jnt_dofadr[j], {0: 6, 1: 3}.get(int(m.jnt_type[j]), 0)
             m.dof_armature[start : start + size] = 0.0
             if m.jnt_type[j] == 0:
-                m.dof_damping[start : start + size] = m.jnt_stiffness[j] = 0.0
+                m.jnt_stiffness[j] = 0.0
 
     def use(self, model):
         """Take the names of joints, for those that have none in the file."""

@@ -13,12 +13,20 @@ SOLIMP = ("geom_solimp", "jnt_solimp", "eq_solimp", "pair_solimp", "tendon_solim
 IMPEDANCES = (0.9998, 0.9999)
 #: Distance from its limit at which a joint is held by it, rad and m.
 AT_LIMIT = 1e-9
+#: Gap below which geoms touch and limits hold once they are at rest, m and rad; overlap that is
+#: left, m: more than MuJoCo's meshes lose to single precision.
+NEAR, OVERLAP = 1e-6, 1e-7
+#: Numbers of MuJoCo's kinds of constraints: equalities, limits of joints and tendons.
+EQUALITY, LIMITS = 0, (3, 4)
 
 
 class HardOracle(Oracle):
     """A model of an MJCF file, without dry friction of joints, fluids, and friction of spin.
 
     Its cone is elliptic, and it slips by no regularisation (noslip).
+
+    Attributes:
+        overlap: the largest overlap, or gap of an equality, that is left, m or rad.
     """
 
     def __init__(self, path):
@@ -31,7 +39,7 @@ class HardOracle(Oracle):
         m.opt.wind[:] = m.dof_frictionloss[:] = 0.0
         m.geom_margin[:] = m.geom_gap[:] = m.jnt_margin[:] = 0.0
         m.geom_condim[:] = np.minimum(m.geom_condim, 3)
-        self.data = mujoco.MjData(m)
+        self.data, self.overlap = mujoco.MjData(m), 0.0
 
     def keys(self):
         """Numbers and names of the keyframes that have one."""
@@ -46,13 +54,16 @@ class HardOracle(Oracle):
         m, d = self.model, self.data
         if key is not None:
             mujoco.mj_resetDataKeyframe(m, d, key)
+        activations = d.act.copy()
         self._soften((0.004, 1.0), IMPEDANCES[1])
         m.opt.iterations, m.opt.noslip_iterations = 50, 0
         for _ in range(round(time / m.opt.timestep)):
             mujoco.mj_step(m, d)
         m.opt.iterations, m.opt.noslip_iterations = 500, 200
-        d.qvel[:], found = 0.0, []
-        self._keep_to_limits()
+        d.qvel[:], d.act[:], found = 0.0, activations, []
+        m.opt.ccd_tolerance, m.opt.ccd_iterations = 1e-12, 200
+        self._soften((-1e-9, -1e-9), IMPEDANCES[1])
+        self._move_apart()
         for impedance in IMPEDANCES:
             self._soften((-1e-9, -1e-9), impedance)
             mujoco.mj_forward(m, d)
@@ -69,12 +80,8 @@ class HardOracle(Oracle):
         Raises:
             ValueError: not solved to 1e-9 of the largest force.
         """
-        m, d, mj = self.model, self.data, self.mujoco
-        J, M = np.zeros((d.nefc, m.nv)), np.zeros((m.nv, m.nv))
-        mj.mj_fullM(m, d, M)
-        for k in range(m.nv):  # J e_k, however J is stored
-            mj.mj_mulJacVec(m, d, column := np.zeros(d.nefc), np.eye(m.nv)[k])
-            J[:, k] = column
+        d = self.data
+        J, M = self._rows()
         A, b = J @ np.linalg.solve(M, J.T), J @ d.qacc_smooth
         cones = [(c.efc_address, c.friction[0] if c.dim > 1 else 0.0) for c in d.contact]
         alone = np.isin(d.efc_type, (3, 4, 5))  # limits, and contacts without friction
@@ -90,7 +97,7 @@ class HardOracle(Oracle):
                     z[k], z[k + 1 : k + 3] = push, z[k + 1 : k + 3] * mu * push / slip
             return z
 
-        for _ in range(200_000):
+        for _ in range(50_000):
             u = A @ x + b
             for k, mu in ((k, mu) for k, mu in cones if k >= 0 and mu):
                 u[k] += mu * np.hypot(*u[k + 1 : k + 3])
@@ -104,14 +111,45 @@ class HardOracle(Oracle):
             y += size * (between - x)
         raise ValueError("rigid contacts are not solved")
 
-    def _keep_to_limits(self):
-        """Put joints that have yielded back at their limits, which hold them from there on."""
-        m = self.model
+    def _rows(self):
+        """Rows of constraints, and the mass matrix."""
+        m, d, mj = self.model, self.data, self.mujoco
+        J, M = np.zeros((d.nefc, m.nv)), np.zeros((m.nv, m.nv))
+        mj.mj_fullM(m, d, M)
+        for k in range(m.nv):  # J e_k, however J is stored
+            mj.mj_mulJacVec(m, d, column := np.zeros(d.nefc), np.eye(m.nv)[k])
+            J[:, k] = column
+        return J, M
+
+    def _move_apart(self):
+        """Undo what contacts, limits and equalities have yielded, by Newton's method.
+
+        What is nearer than NEAR touches: of a box that lies on a plane all corners, not the lowest.
+        """
+        m, d, mj = self.model, self.data, self.mujoco
         for j in np.flatnonzero(m.jnt_limited):
             if m.jnt_type[j] > 1:
                 at = m.jnt_qposadr[j]
-                self.data.qpos[at] = np.clip(self.data.qpos[at], *m.jnt_range[j])
-        m.jnt_margin[:] = AT_LIMIT
+                d.qpos[at] = np.clip(d.qpos[at], *m.jnt_range[j])
+        m.geom_margin[:] = m.jnt_margin[:] = m.tendon_margin[:] = NEAR
+        for _ in range(50):
+            mj.mj_forward(m, d)
+            missed, equal = np.zeros(d.nefc), d.efc_type == EQUALITY
+            missed[equal] = d.efc_pos[equal]
+            for c in d.contact:
+                if c.efc_address >= 0:
+                    missed[c.efc_address] = c.dist + OVERLAP
+            limits = np.isin(d.efc_type, LIMITS)
+            missed[limits] = d.efc_pos[limits]
+            self.overlap = np.abs(missed).max(initial=0.0)
+            if self.overlap <= 0.1 * AT_LIMIT:
+                break
+            J, M = self._rows()
+            J = J[missed != 0.0]
+            to_q = np.linalg.solve(M, J.T)
+            move = to_q @ np.linalg.lstsq(J @ to_q, -missed[missed != 0.0], rcond=1e-9)[0]
+            mj.mj_integratePos(m, d.qpos, move, 1.0)
+        m.geom_margin[:], m.jnt_margin[:], m.tendon_margin[:] = 0.0, AT_LIMIT, AT_LIMIT
 
     def _soften(self, solref, impedance):
         for name in SOLREF:

@@ -55,7 +55,7 @@ def spring_block(x, mu, k):
     scene.add_force("weight", "g")
     scene.add_point("A", "ground", [-1.0, 0.0, 0.05])
     scene.add_force("ptp", "spring", P_i="block.O", P_j="A", k=k, l0=1.0)
-    scene.add_contact("box_plane", "floor", P_i="block.O", size=[0.1, 0.1, 0.1], mu=mu)
+    scene.add_contact("box_plane", "floor", body_i="block", size=[0.1, 0.1, 0.1], mu=mu)
     return scene
 
 

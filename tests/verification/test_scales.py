@@ -361,22 +361,36 @@ def test_limits_of_angles_do_not_depend_on_the_size_of_what_turns(length):
 
 def rubbing_pendulum(length):
     """A pendulum that begins level, on a hinge whose friction holds half of its weight's moment."""
+    return pendulum_on("ground", dap.Scene(name="rubbing"), length)
+
+
+def rubbing_cart(length):
+    """The same on a cart that slides until its friction, under their load, holds it."""
     scene = dap.Scene(name="rubbing")
+    scene.add_body("cart", mass=2.0, Jp=[0.1 * length**2] * 3, r_dot=[0.8 * length, 0.0, 0.0])
+    scene.add_joint("tran", "way", P_i="cart.O", P_j="ground.O", a_j="ground.x")
+    scene.add_force("friction", "brake", joint="way", mu=0.35)
+    return pendulum_on("cart", scene, length)
+
+
+def pendulum_on(base, scene, length):
     scene.add_body("rod", mass=1.0, Jp=[0.02 * length**2] * 3, r=[0.4 * length, 0.0, 0.0])
     scene.add_point("pin", "rod", [-0.4 * length, 0.0, 0.0])
-    scene.add_joint("rev", "hinge", P_i="pin", P_j="ground.O", a_i="rod.y", a_j="ground.y")
+    scene.add_joint("rev", "hinge", P_i="pin", P_j=f"{base}.O", a_i="rod.y", a_j=f"{base}.y")
     scene.add_force("rot_friction", "rub", joint="hinge", n_c=2.0 * length**2)
     scene.add_force("weight", "weight", gravity=GRAVITY * length)
     return scene
 
 
-@pytest.mark.parametrize("length", [1e-6, 1e4])
-def test_friction_of_hinges_does_not_depend_on_the_size_of_what_turns(length):
+@pytest.mark.parametrize("length", [1e-9, 1e-6, 1e4])
+@pytest.mark.parametrize("make", [rubbing_pendulum, rubbing_cart])
+def test_friction_of_hinges_does_not_depend_on_the_size_of_what_turns(make, length):
     """Rows of angles and of lengths stand side by side in the start of contacts: of a mechanism of
     a micrometre those of lengths were taken for dependent, and the hinge stuck for ever, by a
-    moment twice its bound. Compared at rtol 1e-10."""
-    metres, other = (
-        dap.simulate(rubbing_pendulum(x), t_end=0.6, dt=0.1, rtol=1e-10) for x in (1.0, length)
-    )
-    assert metres.contact("rub").mode.tolist() == other.contact("rub").mode.tolist() == [1] * 7
+    moment twice its bound, and the cart by friction that never changed. Compared at rtol 1e-10."""
+    metres, other = (dap.simulate(make(x), t_end=0.6, dt=0.1, rtol=1e-10) for x in (1.0, length))
+    for name in metres.contact_names:
+        assert other.contact(name).mode.tolist() == metres.contact(name).mode.tolist()
+    assert (metres.contact("rub").mode == 1).all()
+    assert [event.kind for event in other.events] == [event.kind for event in metres.events]
     assert other.r / length == pytest.approx(metres.r, abs=1e-9)

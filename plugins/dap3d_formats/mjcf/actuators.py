@@ -18,7 +18,7 @@ from dap3d_core.interface.formats import (
     XmlElement,
 )
 from dap3d_formats.mjcf.keyframes import Keyframe, actuators_of
-from dap3d_formats.mjcf.length_range import length_range
+from dap3d_formats.mjcf.length_range import length_range, slopes
 from dap3d_formats.mjcf.reader import MjcfReader
 from dap3d_formats.mjcf.tendons import SCALAR, line_of, tendon_of
 
@@ -148,9 +148,13 @@ class ActuatorReader:
         (at_low, at_high), (force,) = number["range"], number["force"]
         if not low < high or not at_low < at_high:
             return "a muscle without lengthrange, of joints without limits: give lengthrange"
-        if force < 0.0:
-            return "a muscle whose force is scaled by the mass matrix"
         gear = element.numbers("gear", None, (1.0,))[0]
+        if force < 0.0:  # the acceleration that it gives is
+            arms = slopes(self.reader, line)
+            moved = None if arms is None else self.inertia.acceleration_of(arms)
+            if moved is None:
+                return "a muscle whose force is scaled by the mass matrix, which is not known"
+            force = number["scale"][0] / max(LEAST, abs(gear) * moved)
         times = (*element.numbers("dynprm", None, (1.0,)), 0.0, 0.0)[:3]
         if element.name == "muscle":
             times = (

@@ -1,6 +1,7 @@
 """Equalities of MJCF."""
 
 import attrs
+import numpy as np
 
 from dap3d_core.interface.formats import (
     WORLD,
@@ -8,6 +9,7 @@ from dap3d_core.interface.formats import (
     FormatError,
     Frame,
     Joint,
+    Limits,
     Place,
     Tendon,
     XmlElement,
@@ -20,6 +22,8 @@ from dap3d_formats.mjcf.tendons import line_of, pose_of, tendon_of
 
 #: Joints with one coordinate.
 SCALAR = ("revolute", "prismatic")
+#: Limits of a joint that follows another are implied by those up to this part of their range.
+IMPLIED = 1e-3
 
 
 def read_equalities(reader: MjcfReader) -> None:
@@ -101,12 +105,27 @@ def _couple(reader: MjcfReader, element: XmlElement) -> None:
         _hold_sum(reader, element, "", {joint: 1.0}, a0)
         return
     _joint(reader, other, element.place)
-    if any(higher):
-        text = "an equality of joints with a polynomial of a higher degree"
-        reader.document.source.remarks.leave_out(element.place, text, motion=True)
-        return
-    name = element.get("name") or ""
-    reader.model.couplings.append(Coupling(name, joint, other, a1, a0, element.place))
+    name, curve = element.get("name") or "", (a0, a1, *higher) if any(higher) else ()
+    coupling = Coupling(name, joint, other, a1, a0, element.place, curve)
+    reader.model.couplings.append(coupling)
+    if curve:
+        _imply_limits(reader, coupling)
+
+
+def _imply_limits(reader: MjcfReader, coupling: Coupling) -> None:
+    """Leave the limits of a joint to the one that it follows, where those imply them.
+
+    They are often the ends of the curve, where the other joint would be held by no finite force.
+    """
+    joints = reader.model.joints
+    own, leading = joints[coupling.joint].limits[0], joints[coupling.other].limits[0]
+    if np.isfinite([leading.lower, leading.upper, own.upper - own.lower]).all():
+        q = np.linspace(leading.lower, leading.upper, 1001)
+        ends, slack = np.polynomial.polynomial.polyval(q, coupling.curve), own.upper - own.lower
+        if (abs(ends - 0.5 * (own.lower + own.upper)) <= (0.5 + IMPLIED) * slack).all():
+            text = "limits of a joint that follows another, which that one's imply: left to it"
+            reader.document.source.remarks.translate(coupling.place, text)
+            joints[coupling.joint].limits = (Limits(),)
 
 
 def _couple_by_tendon(reader: MjcfReader, element: XmlElement) -> None:

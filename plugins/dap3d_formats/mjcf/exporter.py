@@ -237,7 +237,9 @@ class _Writer:
             self._loop(joint)
         for coupling in self.model.couplings:
             self.text.empty("joint", joint1=coupling.joint, joint2=coupling.other,
-                            polycoef=words([coupling.offset, coupling.ratio, 0, 0, 0]))  # fmt: skip
+                            polycoef=words(
+                                coupling.curve or (coupling.offset, coupling.ratio, 0, 0, 0)
+                            ))  # fmt: skip
         self.text.close("equality")
 
     def _loop(self, joint: Joint) -> None:

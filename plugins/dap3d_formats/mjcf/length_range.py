@@ -1,4 +1,4 @@
-"""Least and greatest lengths of tendons within the limits of joints.
+"""Least and greatest lengths of tendons within the limits of joints, and their slopes.
 
 MuJoCo's compiler finds them by simulation: it pulls and pushes along the tendon from where the file
 draws the model, to 5 % of the range (tolrange). Here they are the nearest minimum and maximum, or
@@ -43,7 +43,7 @@ def length_range(reader: MjcfReader, line: Tendon) -> tuple[float, float]:
     def length(x: np.ndarray, sign: float) -> float:
         q = dict(zip(free, x.tolist(), strict=True))
         for one in leads.values():
-            q[one.joint] = one.offset + one.ratio * q.get(one.other, 0.0)
+            q[one.joint] = one.at(q.get(one.other, 0.0))
         poses = {WORLD: Frame()}
         return sign * length_of_line(line, lambda link: _pose(reader, link, q, poses))
 
@@ -54,6 +54,21 @@ def length_range(reader: MjcfReader, line: Tendon) -> tuple[float, float]:
         for sign in (1.0, -1.0)
     )
     return max(float(low), own.lower), min(float(high), own.upper)
+
+
+def slopes(reader: MjcfReader, line: Tendon) -> dict[str, float] | None:
+    """By what the length grows with each joint, where the file draws it; None for balls."""
+    if line.terms:
+        return dict(line.terms)
+    movers = _movers(reader, line)
+    if any(joint.kind not in ("revolute", "prismatic") for joint in movers.values()):
+        return None
+
+    def length(name: str, q: float) -> float:
+        poses = {WORLD: Frame()}
+        return length_of_line(line, lambda link: _pose(reader, link, {name: q}, poses))
+
+    return {n: (length(n, CHANGE) - length(n, -CHANGE)) / (2.0 * CHANGE) for n in movers}
 
 
 def _movers(reader: MjcfReader, line: Tendon) -> dict[str, Joint]:

@@ -76,7 +76,7 @@ class MjcfReader:
         """
         document, model = self.document, self.model
         for option in document.root.all("option"):
-            x, y, z = option.numbers("gravity", 3, (0.0, 0.0, -9.81))
+            x, y, z = option.numbers("gravity", 3, tuple(model.gravity))
             model.gravity = (x, y, z)
         if document.disables("gravity"):
             model.gravity = (0.0, 0.0, 0.0)

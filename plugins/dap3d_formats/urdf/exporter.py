@@ -125,6 +125,9 @@ def _write_joint(text: XmlText, joint: Joint, mimic: Coupling | None, remarks: R
         numbers = {"damping": joint.damping, "friction": joint.friction}
         text.empty("dynamics", **{key: words(value) for key, value in numbers.items() if value[0]})
     if mimic is not None:
+        if mimic.curve:
+            what = f"a coupling of {joint.name} by a polynomial: that of the start"
+            remarks.translate(NOWHERE, what, motion=True)
         text.empty("mimic", joint=mimic.other, multiplier=words([mimic.ratio]))
     text.close("joint")
     leave_out_forces(joint, remarks, ("stiffness", "armature"))

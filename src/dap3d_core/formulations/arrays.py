@@ -161,7 +161,10 @@ def _contacts_of(
         rows[:, equations.STATE] = integers[:, layout.integers - 1]
         type_: Any = group.type_info.type
         rows[:, equations.LOADED] = type_.along is not None and not type_.load
-        if group.loaded is not None:
+        rows[:, equations.UNDER] = group.members - first
+        if type_.resists:
+            rows[:, equations.UNDER] = group.loaded - first
+        elif group.loaded is not None:
             joints = plan.joint_row[group.loaded]
             rows[:, equations.LOAD] = joints + type_.load[0]
             rows[:, equations.LOADS] = len(type_.load)
@@ -311,6 +314,13 @@ def _tables(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> tuple[An
     )
 
 
+def _shares_of(model: Model, contacts: Integers) -> Integers:
+    """(m,) index of the first state of the share of each contact."""
+    first = {s.element: s.first for s in model.element_states
+             if s.kind == "joint" and s.name == "near"}  # fmt: skip
+    return np.array([first[model.joint_names[k]] for k in contacts.tolist()], dtype=np.int64)
+
+
 def _integers_of(group: Group, plan: Plan, model: Model) -> Integers:
     """The rows of ``idx`` of a group, as interface/codegen/loop_source.py lays them out."""
     kind = group.type_info.type.kind
@@ -325,6 +335,8 @@ def _integers_of(group: Group, plan: Plan, model: Model) -> Integers:
         parts.append(np.array([plan.joint_block[m] for m in joints], dtype=np.int64))
         if group.loaded is not None:
             parts.append(plan.joint_row[group.loaded][:, None])
+            if group.type_info.type.resists:  # type: ignore[attr-defined]
+                parts.append(_shares_of(model, group.loaded)[:, None])
     elif kind == "function":
         parts.append(1 + group.members[:, None])
     for read in group.read:

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dap3d_core.interface.codegen.reactions import joint_fields
-from dap3d_core.interface.contacts.contact import RESISTED
 from dap3d_core.interface.types import BodyPose, pose
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers, PrepareError
 from dap3d_core.model.joint_angles import JointAngles, joint_angle_name
@@ -126,11 +125,8 @@ class Model:
 
     @property
     def resists_turning(self) -> bool:
-        """True if contacts resist that bodies roll or spin, which steps alone can follow."""
-        shapes = self.collisions
-        if shapes is not None and shapes.mu_roll.size + shapes.mu_spin.size:
-            return True
-        return any(group.number(name).any() for group in self.contacts for name in RESISTED)
+        """True if declared contacts resist that bodies roll or spin."""
+        return any(group.type_info.type.resists for group in self.contacts)  # type: ignore[attr-defined]
 
     @property
     def contacts(self) -> tuple[Group, ...]:

@@ -27,7 +27,8 @@ KINDS = ("time", "input", "parameter", "output", "state", "derivative", "indicat
 #: Of these those that are parameters: set at any time, and before a run begins.
 PARAMETERS = ("parameter", "fixed")
 #: Limits of contact_jumps.py that the runtime has as well: gaps that touch; what comes to no end.
-LIMITS = ("TOUCHING", "TOUCHING_AT_START", "MOST_CHANGES", "WITHIN", "MOST_STEPS", "SLOW")
+LIMITS = ("TOUCHING", "TOUCHING_AT_START", "MOST_CHANGES", "WITHIN", "MOST_JAMS", "RATTLING",
+          "MOST_STEPS", "SLOW")  # fmt: skip
 
 
 @attrs.frozen
@@ -309,7 +310,7 @@ def _jumps(prepared: PreparedRun) -> list[str]:
 def _contacts(law: ContactCode, place: Callable[[Any], int]) -> list[str]:
     """The same of contacts that events follow."""
     s = law.arguments[0]
-    names = ("y", "integer", "limit", "length", "ended", "switches")
+    names = ("y", "integer", "limit", "length", "arm", "ended", "switches")
     numbers: dict[str, Any] = {"JUMPS": 0, "CONTACTS": len(law.names)}
     numbers |= {name: getattr(contact_jumps, name) for name in LIMITS}
     numbers |= {f"CONTACT_{name.upper()}": place(getattr(s, name)) for name in names}

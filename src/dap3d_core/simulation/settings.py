@@ -55,10 +55,6 @@ def _with_contact_engine(compiled: CompiledModel, settings: Simulation) -> Simul
         what = "shapes that collide are followed by stepping, and not by events"
         remedy = "leave it out, or declare the pairs that touch in [contacts]"
         raise SceneError([Mistake("contact", "events", what, remedy=remedy)])
-    if model.resists_turning and settings.contact == "events":
-        what = "what resists rolling or spinning is followed by stepping, and not by events"
-        remedy = "leave it out, or leave mu_roll and mu_spin out of contacts and materials"
-        raise SceneError([Mistake("contact", "events", what, remedy=remedy)])
     if not contact_engine_reason(model, settings.contact):
         return settings
     return attrs.evolve(settings, integrator=STEPPING.name, step=settings.contact_step)
@@ -71,8 +67,6 @@ def contact_engine_reason(model: Model, contact: str) -> str:
     if contact == "auto" and model.collisions is not None:
         count = len(set(model.collisions.names))
         return f"{count} shape{'s' * (count != 1)} may meet anywhere"
-    if contact == "auto" and model.resists_turning:
-        return "contacts resist rolling or spinning"
     points = Counter(name.partition("#")[0] for name in model.contact_names)
     closed = sum(min(count, MOST_CLOSED) for count in points.values())
     if contact == "auto" and closed > MOST_BY_EVENTS:

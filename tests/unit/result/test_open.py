@@ -41,7 +41,7 @@ ABOUT = dict(
     stats=RunStatistics(steps=3, rejected=1, rhs=40, projections=4, wall_time_s=0.25),
     known_versions={"dap3d": "0.1", "numpy": "2", "llvmlite": "0", "python": "3"},
 )
-KEEPING = import_module("dap3d_core.simulation.output.recorder")
+KEEPING = import_module("dap3d_core.simulation.run_state")
 READING = import_module("dap3d_core.result.open")
 SHORT = {"t_end": 0.6, "dt": 0.01}
 
@@ -326,7 +326,7 @@ LONG = """
 import resource
 from importlib import import_module
 import dap3d_core as dap
-for name in ("result.open", "simulation.output.recorder"):
+for name in ("result.open", "simulation.run_state"):
     import_module(f"dap3d_core.{name}").LARGE = 2**24
 scene = dap.Scene(name="ten")
 for k in range(10):

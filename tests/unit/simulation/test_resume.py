@@ -13,7 +13,7 @@ from support.internals import FORMAT, Checkpoint, path_of, read_checkpoint, writ
 from support.levels import quickly
 from support.on_axles import driven, stone, wheel
 from support.plain import jit_is_on
-from support.results import same_bits
+from support.results import same_run
 from support.state_types import stated
 
 import dap3d_core as dap
@@ -111,8 +111,8 @@ def test_a_resumed_run_is_that_of_one_that_was_not_ended(case, tmp_path):
     events = {"events": settings["events"]()} if "events" in settings else {}
     found = dap.resume(checkpoint, **events)
     assert [f.name for f in tmp_path.iterdir()] == ["run.nc"]
-    assert same_bits(found, whole)
-    assert same_bits(dap.open(tmp_path / "run.nc"), whole)
+    assert same_run(found, whole)
+    assert same_run(dap.open(tmp_path / "run.nc"), whole)
     assert found.events == whole.events
     assert found.status == whole.status
     counts = ("steps", "rejected", "rhs", "projections")
@@ -136,7 +136,7 @@ def test_the_model_s_own_types_are_resumed_where_they_are_allowed(tmp_path):
         dap.resume(checkpoint, model=folder, allow_code=True)
     (folder / "plugin.py").write_text(text)
     found = dap.resume(checkpoint, model=folder, allow_code=True)
-    assert same_bits(found, whole)
+    assert same_run(found, whole)
     assert found.events == whole.events
     assert [event.t > 0.45 for event in whole.events] == [False, True]
 
@@ -160,7 +160,7 @@ def test_checkpoints_are_written_now_and_then(tmp_path, monkeypatch):
 
     whole = dap.simulate(problems.pendulum(), **SHORT)
     found = dap.simulate(problems.pendulum(), output=output, checkpoint=1e-9, watch=watch, **SHORT)
-    assert same_bits(found, whole)
+    assert same_run(found, whole)
     assert [f.name for f in tmp_path.iterdir()] == ["run.nc"]
     assert len(seen) > 5
     assert all(rows == there for _, rows, there in seen)
@@ -189,7 +189,7 @@ def test_a_run_that_is_killed_is_resumed(every, at, tmp_path):
     whole = dap.simulate(problems.pendulum(), checkpoint=every, **settings)
     rows = read_checkpoint(kept / "run.nc.checkpoint").header["rows"]
     assert rows == 0 if every == 1e6 else rows < len(dap.open(kept / "run.nc.part").t)
-    assert same_bits(dap.resume(kept / "run.nc.checkpoint"), whole)
+    assert same_run(dap.resume(kept / "run.nc.checkpoint"), whole)
     assert [f.name for f in kept.iterdir()] == ["run.nc"]
 
 
@@ -222,9 +222,9 @@ def test_a_callback_that_fails_keeps_all_even_with_an_error_of_the_system(tmp_pa
     with pytest.raises(ConnectionError) as caught:
         dap.simulate(problems.pendulum(), output=tmp_path / "run.nc", watch=broken,
                      checkpoint=math.inf, **SHORT)  # fmt: skip
-    assert same_bits(dap.open(tmp_path / "run.nc"), caught.value.result)
+    assert same_run(dap.open(tmp_path / "run.nc"), caught.value.result)
     whole = dap.simulate(problems.pendulum(), **SHORT)
-    assert same_bits(dap.resume(caught.value.checkpoint), whole)
+    assert same_run(dap.resume(caught.value.checkpoint), whole)
 
 
 def test_without_asking_there_is_none(tmp_path):
@@ -394,7 +394,7 @@ def test_another_output_leaves_what_there_is(copied):
     other.write_text("precious")
     with pytest.raises(OSError, match="the file exists"):
         dap.resume(copied, output=other)
-    assert same_bits(dap.resume(copied, output=other, force=True), whole)
+    assert same_run(dap.resume(copied, output=other, force=True), whole)
     assert sorted(f.name for f in copied.parent.iterdir()) == ["other.nc", "run.nc"]
     assert dap.open(copied.with_name("run.nc")).status == "stopped"
 
@@ -430,5 +430,5 @@ def test_a_resumed_run_removes_the_parts_of_a_killed_one(tmp_path, monkeypatch):
 
     result = dap.resume(checkpoint, progress=look)
     assert all(len(names) == 1 for names in kept), kept
-    assert same_bits(result, dap.simulate(problems.pendulum(), **settings))
+    assert same_run(result, dap.simulate(problems.pendulum(), **settings))
     assert not list(tmp_path.glob("*.part*"))

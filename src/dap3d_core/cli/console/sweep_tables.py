@@ -119,9 +119,15 @@ def show_failing(console: Terminal, data: dict[str, Any], others: str) -> None:
         return
     count = data["stopped"] + data["failed"]
     console.say(f"{count:,} of {data['points']:,} points went wrong:", "red")
-    console.items([f"{_in_words(f['at'])}: {f['status']}: {f['note']}" for f in failing[:LISTED]])
+    console.items([f"{_in_words(f['at'])}: {_reason(f)}" for f in failing[:LISTED]])
     if count > LISTED:
         console.say(f"and {count - LISTED:,} more: {others}", whole=True)
+
+
+def _reason(failed: dict[str, Any]) -> str:
+    """How a point ended, once: notes of runs say that they stopped."""
+    note: str = failed["note"]
+    return note if note.startswith("the run stopped") else f"{failed['status']}: {note}"
 
 
 def _in_words(at: dict[str, Any]) -> str:

@@ -374,37 +374,36 @@ def _add_stop(builder: ModelBuilder, element: Element) -> None:
 
 def _of_plane(builder: ModelBuilder, element: Element) -> tuple[Joint, float, float] | None:
     """The joint of a ball at a plane, the sense of its distance, and that where q = 0."""
-    elements = builder.elements
     fields = {"P_j": f"{GROUND}.O", "a_j": f"{GROUND}.z"} | element.fields
-    i, j = (elements.point(fields[end])[0] for end in ("P_i", "P_j"))
-    found = _joint_along(builder, "prismatic", {i, j}, fields["a_j"])
-    if found is None or elements.vector(fields["a_j"])[0] != j:
+    if builder.elements.vector(fields["a_j"])[0] != builder.elements.point(fields["P_j"])[0]:
         return None
-    joint, along = found
-    axis = along * (elements.bodies[joint.body_i].pose.A @ joint.axes[0])
-    distance = -float(axis @ _between(builder, fields))
-    return builder.placed[joint.name], along * (1.0 if i == joint.body_i else -1.0), distance
+    return _of_slider(builder, Element(element.name, element.type, fields))
 
 
 def _add_rotors(builder: ModelBuilder) -> None:
     """Add wheels as armature of the joint that turns as they do, and couplings of others."""
     for name, rotor in builder.elements.rotors.items():
-        pairs: list[tuple[str, float]] = []
+        pairs: list[tuple[str, float, tuple[float, ...]]] = []
         for follower, fields in rotor.followers:
             joint = _followed(builder, fields)
             if joint is None:
                 text = f"{follower} of type follow: it follows no joint"
                 builder.remarks.leave_out(NOWHERE, text, motion=True)
                 continue
-            pairs.append((joint.name, float(fields.get("ratio", 1.0))))
-        place = next((k for k, (_, ratio) in enumerate(pairs) if ratio == 1.0), None)
+            ratio = float(fields.get("ratio", 1.0))
+            bends = fields["bends"] if fields.get("curved") else ()
+            curve = (0.0, ratio, *(b / k for k, b in enumerate(bends, 2))) if bends else ()
+            pairs.append((joint.name, ratio, curve))
+        place = next((k for k, (_, *law) in enumerate(pairs) if law == [1.0, ()]), None)
         if place is None:
             text = f"wheel {name}: no joint turns as it does"
             builder.remarks.leave_out(NOWHERE, text, motion=True)
             continue
-        leader, _ = pairs.pop(place)
+        leader, *_ = pairs.pop(place)
         builder.placed[leader].armature = (rotor.inertia,)
-        builder.model.couplings += [Coupling("", one, leader, ratio) for one, ratio in pairs]
+        builder.model.couplings += [
+            Coupling("", one, leader, ratio, curve=curve) for one, ratio, curve in pairs
+        ]
 
 
 def _followed(builder: ModelBuilder, fields: dict[str, Any]) -> SceneJoint | None:

@@ -1,6 +1,7 @@
 """Joints of a model as joints of a scene: body i is the child, body j the parent."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from math import pi
 from typing import Any
 
 import numpy as np
@@ -150,7 +151,7 @@ def add_rotor(builder: SceneBuilder, joint: Joint, inertia: float) -> None:
     text = "armature of a joint is a wheel on ground that turns with it"
     builder.remarks.translate(joint.place, text)
     wheel = wheel_of(builder, joint, 1.0, inertia)
-    follow(builder, joint, wheel, 1.0, "rotor")
+    follow(builder, joint, wheel, (1.0,), "rotor")
 
 
 def wheel_of(builder: SceneBuilder, joint: Joint, mass: float, inertia: float) -> str:
@@ -176,14 +177,18 @@ def add_wheel(
                             a_i=f"{wheel}.z", a_j="ground.z")  # fmt: skip
 
 
-def follow(builder: SceneBuilder, joint: Joint, wheel: str, ratio: float, suffix: str) -> None:
-    """Couple the coordinate of a joint with a wheel."""
+def follow(
+    builder: SceneBuilder, joint: Joint, wheel: str, ratios: Sequence[float], suffix: str
+) -> None:
+    """Couple the coordinate of a joint with a wheel; the ratio is a polynomial of its angle."""
+    ratio, *bends = (*map(float, ratios), 0.0, 0.0, 0.0)[:4]
+    curve: dict[str, Any] = {"curved": True, "bends": tuple(bends)} if any(bends) else {}
     ends = named_ends(builder, from_ground(builder, joint))
     name = builder.names.free("joints", f"{ends.name}_{suffix}")
     builder.scene.add_joint(
         "follow", name, body_i=ends.child, a_j=ends.vector("j", ends.joint.axes[0], "_axis"),
         a_k=f"{wheel}.z", ratio=None if ratio == 1.0 else ratio,
-        along=True if joint.kind == "prismatic" else None,
+        along=True if joint.kind == "prismatic" else None, **curve,
     )  # fmt: skip
 
 
@@ -217,8 +222,12 @@ def add_couplings(builder: SceneBuilder, model: Articulation) -> None:
             builder.names.scene_names["followed", other.name] = wheel
             text = "joints are coupled by a wheel on ground, with a millionth of the inertia"
             builder.remarks.translate(coupling.place, text)
-            follow(builder, other, wheel, 1.0, "rotor")
-        follow(builder, one, wheel, coupling.ratio, "coupling")
+            follow(builder, other, wheel, (1.0,), "rotor")
+        start, limits = other.position[0], other.limits[0]
+        if coupling.curve and max(start - limits.lower, limits.upper - start) > pi:
+            text = "an equality of joints with a polynomial: it holds to half a turn from the start"
+            builder.remarks.translate(coupling.place, text, motion=True)
+        follow(builder, one, wheel, coupling.slopes(start), "coupling")
 
 
 def light(builder: SceneBuilder, *joints: Joint) -> tuple[float, float]:

@@ -54,7 +54,7 @@ def start_of(
         )
         for name, joint in model.joints.items()
     }
-    model = attrs.evolve(model, joints=joints)
+    model = attrs.evolve(model, joints=joints, couplings=list(model.couplings))
     start = _Start(model, remarks, limited)
     start.place(positions)
     start.move(rates)
@@ -81,10 +81,14 @@ class _Start:
     def place(self, given: Given) -> None:
         """Set the coordinates."""
         joints = self.model.joints
+        self._take_tangents()
         self._hold_followers(given)
         start = {name: joint.position[0] for name, joint in joints.items() if joint.kind in SCALAR}
         for name, q in self._followed(start, given, "position").items():
             joints[name].position = (q,)
+        for one in (one for one in self.couplings if one.curve):
+            joints[one.joint].position = (one.at(joints[one.other].position[0]),)
+        self._take_tangents()
         for name in self.locked:
             text = "limits that are equal hold a joint: it is fixed"
             self.remarks.translate(joints[name].place, text, motion=True)
@@ -93,6 +97,15 @@ class _Start:
             if self.limited and joint.kind == "universal" and len(joint.limits) == 2:
                 pairs = zip(joint.position, joint.limits, strict=True)
                 joint.position = tuple(self._inside(joint, q, one) for q, one in pairs)
+
+    def _take_tangents(self) -> None:
+        """Take the ratios of curved couplings where the others are, within their limits."""
+        for k, one in enumerate(self.model.couplings):
+            if one.curve and couples(self.model, one):
+                q, limits = _coordinate(self.model.joints[one.other]), Limits()
+                if self.limited:
+                    limits = self.model.joints[one.other].limits[0]
+                self.model.couplings[k] = one.tangent(min(max(q, limits.lower), limits.upper))
 
     def _hold_followers(self, given: Given) -> None:
         """Fix joints that are coupled with fixed ones.
@@ -107,8 +120,8 @@ class _Start:
                 ends = [joints.get(name) for name in (one.joint, one.other)]
                 kinds = [None if end is None else end.kind for end in ends]
                 if kinds[1] == "fixed" and kinds[0] in SCALAR:
-                    joint, q = one.joint, one.offset + one.ratio * _coordinate(joints[one.other])
-                elif kinds[0] == "fixed" and kinds[1] in SCALAR and one.ratio:
+                    joint, q = one.joint, one.at(_coordinate(joints[one.other]))
+                elif kinds[0] == "fixed" and kinds[1] in SCALAR and one.ratio and not one.curve:
                     joint, q = one.other, (_coordinate(joints[one.joint]) - one.offset) / one.ratio
                 else:
                     continue

@@ -7,7 +7,8 @@ which ends at rounding (Alart and Curnier, Comp. Meth. Appl. Mech. Eng. 92, 1991
 
     x_N = max(0, x_N - r u_N),    x_T = proj(mu (x_N + more); x_T - r u_T)
 
-Friction without a normal may act in all three directions: x = proj(mu more; x - r u).
+Friction without a normal may act in all three directions: x = proj(mu more; x - r u). What resists
+rolling and spinning has the normal of another contact: x_T = proj(mu x_N of that; x_T - r u_T).
 Where contacts share what they carry Newton may stall. Then the proximal point method comes nearer
 (Rockafellar, SIAM J. Control Optim. 14, 1976): A + D and b - D x, x of the problem before.
 Friction in an ellipse is that in a circle of rows that are stretched.
@@ -50,8 +51,7 @@ class Cone(Arrays):
     """A problem of ``count`` contacts, of m at most, and scratch."""
 
     types: ClassVar[dict[str, Any]] = {
-        "integer": INTEGERS,
-        "order": INTEGERS,
+        **dict.fromkeys(("integer", "order", "under"), INTEGERS),
         **dict.fromkeys(("A", "K", "firm", "S", "w"), MATRIX),
     }
 
@@ -65,7 +65,8 @@ class Cone(Arrays):
     more: Floats  # (m,) normal impulses of an earlier phase, which widen the discs
     gapless: Floats  # (m,) 1 of friction in three directions, else 0
     ratio: Floats  # (m,) of coefficients along t2 to mu, that along t1
-    K: Floats  # A and b stretched; and firmer, with its derivatives
+    under: Integers  # (m,) the contact whose normal widens the disc: itself, or of what resists
+    K: Floats  # rolling the one at which it does. A and b stretched; and firmer, with its derivatives
     q: Floats
     firm: Floats
     moved: Floats
@@ -91,6 +92,7 @@ def cone_of(m: int) -> Cone:
         **{name: np.zeros(n) for name in vectors},
         **{name: np.zeros(m) for name in ("mu", "more", "gapless", "r")},
         ratio=np.ones(m),
+        under=np.arange(m),
         w=np.zeros((3, n)),
         order=np.zeros(n, dtype=np.int64),
     )
@@ -184,7 +186,8 @@ def residual_of(c: Cone, A: Floats, b: Floats, x: Floats, derives: bool) -> None
             z1 -= r[j] * A[k + 1, q] * x[q]
             z2 -= r[j] * A[k + 2, q] * x[q]
         is_free = free[j] != 0.0
-        pressing = more[j] if is_free else x[k] + more[j]
+        u = c.under[j]
+        pressing = more[j] if is_free else x[3 * u] + more[u]
         first = z0 if is_free else 0.0
         radius = mu[j] * max(pressing, 0.0)
         length = np.sqrt(first * first + z1 * z1 + z2 * z2)
@@ -204,8 +207,9 @@ def residual_of(c: Cone, A: Floats, b: Floats, x: Floats, derives: bool) -> None
             S[k, q] = r[j] * A[k, q] if z0 > 0.0 else own0
             if is_free:
                 S[k, q] = own0 - part * (s0 - along * d0)
-            S[k + 1, q] = own1 - part * (s1 - along * d1) - rim * d1 * own0
-            S[k + 2, q] = own2 - part * (s2 - along * d2) - rim * d2 * own0
+            wider = rim * float(q == 3 * u)
+            S[k + 1, q] = own1 - part * (s1 - along * d1) - wider * d1
+            S[k + 2, q] = own2 - part * (s2 - along * d2) - wider * d2
 
 
 @compiled
@@ -228,7 +232,9 @@ def sweep(c: Cone, A: Floats, b: Floats, x: Floats, sweeps: int) -> None:
             u2 += A[k + 2, k] * (n - x[k])
             z1, z2 = x[k + 1] - r[j] * u1, x[k + 2] - r[j] * u2
             z0 = x[k] - r[j] * u0 if is_free else 0.0
-            radius = mu[j] * max(more[j] if is_free else n + more[j], 0.0)
+            u = c.under[j]
+            pressing = n + more[j] if u == j else x[3 * u] + more[u]
+            radius = mu[j] * max(more[j] if is_free else pressing, 0.0)
             length = np.sqrt(z0 * z0 + z1 * z1 + z2 * z2)
             factor = radius / length if length > radius else 1.0
             n = factor * z0 if is_free else n

@@ -55,7 +55,7 @@ class ContactArrays(Arrays):
         "cone": Cone.type_of(),
         "says": ContactOutputs.type_of(),
         **dict.fromkeys(
-            ("integer", "newton", "alone", "load_row", "load_count", "load_pushes", "touching",
+            ("integer", "newton", "alone", "under", "load_row", "load_count", "load_pushes", "touching",
              "closed", "group", "kept", "mine", "begins", "leaves", "gone", "slides", "slipping",
              "jams", "order", "rows", "before", "along_with", "state", "frame_body", "model_row",
              "in_touch", "stops", "opening", "is_low", "rests_soon", "role", "is_active", "active"),
@@ -80,6 +80,7 @@ class ContactArrays(Arrays):
     is_free = _integer()  # 1: ``free`` is of the present velocities
     starts = _integer()  # 1 at the start of a run
     jammed = _integer()  # a contact that has been found to jam, or -1
+    freed = _integer()  # how often impulses without a collision have ended a jam
     culprit = _integer()  # a contact with which no motion goes on
     round_count = _integer()  # of those kept
     exchanged = _real()  # J, sum of the magnitudes of work
@@ -94,10 +95,12 @@ class ContactArrays(Arrays):
     ratio: Floats
     ratio_s: Floats
     e: Floats
-    length: Floats  # of the scene, m, and 1 of what turns
+    length: Floats  # (m,) of the scene, m
+    arm: Floats  # of what turns that length, which makes it slip; else 1
     gapless: Floats  # 1 where the first row is one of slip, and not along a normal
     newton: Integers  # 1 where the law of impact is Newton's
     alone: Integers  # 1 of friction without a gap: of joints
+    under: Integers  # of what resists rolling the contact whose normal force bounds it; else -1
     holds: Integers  # (m, 3) 1 of rows that act where it sticks
     turns: Floats  # 1 of those whose gap or slip is an angle
     state: Integers  # the first of their numbers among the states of elements

@@ -41,12 +41,14 @@ class ContactTable:
         turns: (m,) 1 of those whose gap or slip is an angle, 0 of others.
         length: (m,) what limits of gaps and speeds are multiplied by: the length of the scene, m;
             1 rad of those that turn.
+        arm: (m,) m, of those that turn: on it their angles are gaps and slip, as of the others; 1.
         movable: (m,) True of those that a scene may have moved until they touch.
         alone: (m,) True of friction without a gap: of joints.
         holds: (m, 3) True of the rows that act where it sticks.
         gapless: (m,) 1 where the first row is one of slip, and not along a normal; else 0.
         says, tensions: what they say of themselves, and the loops that find it.
         loads: contact -> rows of the joint whose load its friction has, and whether they push.
+        under: (m,) of what resists rolling the contact that presses, which is before it; else -1.
         mode, way, near: (m,), (m, 3), (m, 3) where each has them among the states of elements.
     """
 
@@ -60,6 +62,7 @@ class ContactTable:
         self.alone = np.zeros(self.count, dtype=bool)
         self.holds = np.ones((self.count, 3), dtype=bool)
         self.loads: dict[int, tuple[Integers, bool]] = {}
+        self.under: Integers = np.full(self.count, -1)
         self.newton = np.array([law == "newton" for law in model.contact_laws], dtype=bool)
         self.numbers = {name: np.zeros(self.count) for name in ("mu", "mu_s", "e")}
         self.movable = np.array(["#" not in name for name in self.names], dtype=bool)
@@ -73,7 +76,9 @@ class ContactTable:
             type_: Any = group.type_info.type
             self.turns[which], self.alone[which] = type_.at is None, type_.is_friction_alone()
             self.holds[which] = type_.holds
-            if group.loaded is not None:
+            if type_.resists:
+                self.under[which] = group.loaded - first
+            elif group.loaded is not None:
                 starts = model.joint_start[group.loaded][:, None] + type_.load
                 self.loads |= {int(c): (rows, type_.pushes)
                                for c, rows in zip(which, starts, strict=True)}  # fmt: skip
@@ -84,7 +89,7 @@ class ContactTable:
             q = next(q for q, (kind, g) in enumerate(evaluator.loop_groups)
                      if g is group and kind == "switch")  # fmt: skip
             loops.append(compiled_loop(group.type_info, "tension"))
-            width = WIDTH + LAW_WIDTH * (type_.grip is not None)
+            width = WIDTH + LAW_WIDTH * type_.has_law()
             groups.append([*evaluator.system.groups[q], width, len(order)])
             order += which.tolist()
         self.tensions: Any = loop_list(loops)
@@ -95,6 +100,7 @@ class ContactTable:
             values=np.zeros(max(sizes, default=0)), place=np.zeros(1),
         )  # fmt: skip
         self.length = np.where(self.turns > 0.0, 1.0, model.length)
+        self.arm = model.length / self.length
         self.gapless = (self.alone & self.holds[:, 0]).astype(float)
         self.way: Integers = self.mode[:, None] + np.arange(1, 4)
         self.near: Integers = self.mode[:, None] + np.arange(4, 7)
@@ -111,15 +117,19 @@ class ContactTable:
         """
         evaluator, model = self.evaluator, self.evaluator.model
         names = (
-            "mu", "mu_s", "e", "ratio", "ratio_s", "gapless", "length", "turns", "says", "switches"
+            "e", "ratio", "ratio_s", "gapless", "arm", "turns", "says", "switches"
         )  # fmt: skip
         given = {name: getattr(self, name) for name in names}
         slots = model.joint_slots[len(model.joint_names) - self.count :]
         places, order = evaluator.system.row, np.zeros(evaluator.plan.row_size, dtype=np.int64)
         order[places] = np.arange(len(places))
         s = contact_arrays(self.count, model.joint_row_count, len(self.loads), rounds, given | {
+            "mu": self.mu / self.arm,
+            "mu_s": self.mu_s / self.arm,
+            "length": self.length * self.arm,
             "newton": self.newton.astype(np.int64),
             "alone": self.alone.astype(np.int64),
+            "under": self.under,
             "holds": self.holds.astype(np.int64),
             "state": self.mode,
             "frame_body": np.array([one[0] or one[1] for one in slots], dtype=np.int64),
@@ -196,9 +206,9 @@ def find_grips(t: float, s: ContactArrays, system: System, tensions: Any) -> Non
             call_tension(t, k, o, system.multipliers, system, tensions)
             for q in range(o.groups[k, 2]):
                 c, law = o.which[first + q], o.values[width * q + WIDTH :]
-                s.mu[c], s.mu_s[c] = law[SLIDING], law[STICKING]
-                s.ratio[c] = law[SLIDING + 1] / s.mu[c] if s.mu[c] > 0.0 else 1.0
-                s.ratio_s[c] = law[STICKING + 1] / s.mu_s[c] if s.mu_s[c] > 0.0 else 1.0
+                s.mu[c], s.mu_s[c] = law[SLIDING] / s.arm[c], law[STICKING] / s.arm[c]
+                s.ratio[c] = law[SLIDING + 1] / law[SLIDING] if law[SLIDING] > 0.0 else 1.0
+                s.ratio_s[c] = law[STICKING + 1] / law[STICKING] if law[STICKING] > 0.0 else 1.0
     for c in range(s.state.shape[0]):
         for i in range(3):
             system.states[s.state[c] + 1 + i] = s.kept_way[c, i]

@@ -91,6 +91,7 @@ def decide(
     if s.jammed >= 0 or not find_modes_now(t, s, system, loops, functions):
         if not unjam(s, system):
             return blame(s)
+        s.freed += 1
         move_on(t, s, system, loops)
         find_grips(t, s, system, tensions)
         for c in range(s.begins.shape[0]):
@@ -137,7 +138,7 @@ def repeat(t: float, s: ContactArrays, system: System, loops: Any, tensions: Any
             for k in range(3):
                 s.way[c, k] = 0.0
                 for i in range(first, 3):
-                    part = s.length[c] * s.slip[c, i] / size
+                    part = s.length[c] / s.arm[c] * s.slip[c, i] / size
                     s.way[c, k] += part * s.frames[c, i, k]
     put_state(s, system)
 
@@ -278,7 +279,7 @@ def find_modes_now(t: float, s: ContactArrays, system: System, loops: Any, funct
         s.touching[k] = s.in_touch[k]
     s.touching_count = s.in_touch_count
     for c in range(s.state.shape[0]):
-        s.load[c] = s.alone[c]
+        s.load[c] = s.alone[c] if s.under[c] < 0 else 0
     return find_modes(s)
 
 
@@ -310,7 +311,8 @@ def settle(s: ContactArrays, system: System) -> None:
     put_roles(s)
     for c in range(s.state.shape[0]):
         gap, rounding = s.says.found[c, GAP], POSITION_ROUNDING * s.length[c]
-        s.values[c], s.least[c] = gap if abs(gap) < s.limit[c] else 0.0, -2.0 * rounding
+        s.values[c] = s.arm[c] * gap if abs(gap) < s.limit[c] else 0.0
+        s.least[c] = -2.0 * rounding
         is_slow = s.closing[c] < AT_REST * s.length[c] or s.opening[c] != 0
         if s.role[c] == 2 and is_slow and s.values[c] < -0.5 * rounding:
             s.role[c] = 1

@@ -72,10 +72,10 @@ PASSES, FALLING, SETTLED, NOISE = 12, 0.1, 1e-12, 1e-9
 REACHED = 1e3
 #: Columns of ``System.contacts``: of each point its loop and where its integers and numbers begin,
 #: its first row, its bodies, its first state; 1 of friction that is the same under any load; of
-#: friction of a joint the first row of its load, how many they are, 1 where that pushes alone.
-LOOP, INTEGERS, NUMBERS, ROW, BODY_I, BODY_J, STATE, LOADED, LOAD, LOADS, PUSHES, COLUMNS = range(
-    12
-)
+#: friction of a joint the first row of its load, how many they are, 1 where that pushes alone; the
+#: contact whose normal force presses, as a rule itself, or that at which it resists rolling.
+LOOP, INTEGERS, NUMBERS, ROW, BODY_I, BODY_J, STATE = range(7)
+LOADED, LOAD, LOADS, PUSHES, UNDER, COLUMNS = range(7, 13)
 #: Passes of Newton's method for loads, and the part that the last one changes.
 LOAD_PASSES, LOAD_SETTLED = 50, 1e-14
 #: Places in a column, from its end: of its contact, of the normal force, of its power.
@@ -157,10 +157,27 @@ def is_sliding(system: System, c: int) -> bool:
 
 @compiled_into
 def is_given(system: System, c: int) -> bool:
-    """True if a contact has a force besides those of its rows."""
-    near, states = system.contacts[c, STATE] + NEAR, system.states
-    some = (states[near] != 0.0) | (states[near + 1] != 0.0) | (states[near + 2] != 0.0)
-    return some & (mode_of(system, c) > _OPEN)
+    """True if a contact has a force besides those of its rows, its own or by what presses it."""
+    own, under = system.contacts[c, STATE] + NEAR, near_of(system, c)
+    mode, states = mode_of(system, c), system.states
+    some = False  # a trace adds conditions to it
+    for k in range(3):
+        some |= (mode > _OPEN) & (states[own + k] != 0.0)
+        some |= (mode > _OPEN) & (mode < _SLIDING) & (states[under + k] != 0.0)
+    return some
+
+
+@compiled_into
+def near_of(system: System, c: int) -> int:
+    """The first state of the share of the contact whose normal force presses."""
+    return system.contacts[system.contacts[c, UNDER], STATE] + NEAR
+
+
+@compiled_into
+def pressed_row(system: System, c: int) -> int:
+    """The row of what presses: a normal force, or the first of the load of a joint."""
+    row = system.contacts[c]
+    return int(row[LOAD] if row[LOADS] > 0 else system.contacts[row[UNDER], ROW])
 
 
 @compiled
@@ -206,12 +223,11 @@ def force_of(t: float, c: int, force: Floats, out: Floats, system: System, loops
 @compiled
 def force_of_one(t: float, c: int, force: Floats, out: Floats, system: System, loops: Any) -> float:
     """As ``force_of``, of the friction of contact c by a normal force or a load of one alone."""
-    states, near = system.states, system.contacts[c, STATE] + NEAR
+    states, near = system.states, near_of(system, c)
     given = states[near], states[near + 1], states[near + 2]
     states[near] = states[near + 1] = states[near + 2] = 0.0
     zero(system.multipliers)
-    place = system.contacts[c, LOAD] if system.contacts[c, LOADS] > 0 else system.contacts[c, ROW]
-    system.multipliers[place] = -1.0
+    system.multipliers[pressed_row(system, c)] = -1.0
     power = force_of(t, c, force, out, system, loops)
     states[near], states[near + 1], states[near + 2] = given
     return power
@@ -263,8 +279,8 @@ def contact_of(system: System, c: int) -> int:
 
 @compiled_into
 def row_of(system: System, c: int) -> int:
-    """The normal row of contact c of those that slide."""
-    return int(system.contacts[contact_of(system, c), ROW])
+    """The normal row that presses contact c of those that slide."""
+    return int(system.contacts[system.contacts[contact_of(system, c), UNDER], ROW])
 
 
 @compiled_into
@@ -356,7 +372,7 @@ def fill_load(system: System, count: int, r: int, A: Floats) -> float:
     for s in range(count):
         A[s] = A[count + s] = 1.0 if r == s else 0.0
     if loads == 0:  # a normal force, of a pass
-        row = system.contacts[c, ROW]
+        row = row_of(system, r)
         rest = -x[row] - N[r]
         for s in range(count):
             slope = column(system, s)[size + row]

@@ -81,8 +81,11 @@ def put_matrix(s: ContactArrays, begins: bool) -> bool:
 def put_plain(s: ContactArrays) -> None:
     """Rates by forces of closed contacts, as if none slid."""
     for k in range(s.closed_count):
-        c = s.closed[k]
-        s.slides[c] = 0
+        c, u = s.closed[k], s.under[s.closed[k]]
+        s.slides[c], s.cone.under[k] = 0, k
+        for q in range(k if u >= 0 else 0):
+            if s.closed[q] == u:
+                s.cone.under[k] = q
         for i in range(3):
             row, from_row = s.cone.A[3 * k + i], s.W[3 * c + i]
             for q in range(s.closed_count):
@@ -92,29 +95,38 @@ def put_plain(s: ContactArrays) -> None:
 
 
 @compiled
+def pressing(s: ContactArrays, k: int) -> float:
+    """What bounds friction of closed contact k: a normal force, or the load of a joint."""
+    return s.cone.x[3 * s.cone.under[k]] + s.load[s.closed[k]]
+
+
+@compiled
 def add_sliding(s: ContactArrays) -> bool:
     """Add what friction of what slides does along with normal forces; False if one jams."""
     A = s.cone.A
     for k in range(s.closed_count):
         c = s.closed[k]
         if s.slides[c] != 0 and s.gapless[c] == 0.0:
-            first, second = against(s.ratio[c], s.along[c])
+            (first, second), u = against(s.ratio[c], s.along[c]), s.cone.under[k]
             for i in range(3 * s.closed_count):
-                A[i, 3 * k] -= s.mu[c] * (A[i, 3 * k + 1] * first + A[i, 3 * k + 2] * second)
-            if A[3 * k, 3 * k] <= 0.0 and s.alone[c] == 0:
-                s.jams[c] = 1
+                A[i, 3 * u] -= s.mu[c] * (A[i, 3 * k + 1] * first + A[i, 3 * k + 2] * second)
+            if A[3 * u, 3 * u] <= 0.0 and s.alone[s.closed[u]] == 0:
+                s.jams[s.closed[u]] = 1
                 return False
     return True
 
 
 @compiled
-def solve_forces(s: ContactArrays, part: float, tries: int, least: float = 0.0) -> bool:
+def solve_forces(
+    s: ContactArrays, part: float, tries: int, least: float = 0.0, resisting: float = 1.0
+) -> bool:
     """Forces of closed contacts into ``cone.x``, which is where it begins, and ``rates``.
 
     False where there are none; of fewer tries than all that is left open.
 
     part: of the cones; contacts that are ``slipping`` have mu, not mu_s.
     least: normal force of each, N.
+    resisting: the same part again of what resists rolling.
     """
     n, cone = 3 * s.closed_count, s.cone
     cone.count = s.closed_count
@@ -132,6 +144,7 @@ def solve_forces(s: ContactArrays, part: float, tries: int, least: float = 0.0) 
                 cone.b[i] += s.load[c] * row[0]
         mu = s.mu[c] if s.slipping[c] != 0 else s.mu_s[c]
         cone.mu[k] = 0.0 if s.slides[c] != 0 else part * mu
+        cone.mu[k] *= resisting if s.under[c] >= 0 else 1.0
         cone.more[k], cone.gapless[k], cone.ratio[k] = s.load[c], s.gapless[c], s.ratio_s[c]
         if least > 0.0 and s.alone[c] == 0:
             for i in range(n):
@@ -152,19 +165,20 @@ def solve_forces(s: ContactArrays, part: float, tries: int, least: float = 0.0) 
         if s.alone[c] == 0:
             cone.x[3 * k] += least
         if s.slides[c] != 0:
-            put_sliding_force(s, c, cone.x[3 * k : 3 * k + 3])
+            put_sliding_force(s, k)
     return True
 
 
 @compiled
-def put_sliding_force(s: ContactArrays, c: int, x: Floats) -> None:
-    """Put friction of a contact that slides beside its normal force."""
+def put_sliding_force(s: ContactArrays, k: int) -> None:
+    """Put friction of closed contact k, which slides, beside its normal force."""
+    c, x = s.closed[k], s.cone.x[3 * k : 3 * k + 3]
     if s.gapless[c] > 0.0:
         for i in range(3):
             x[i] = -s.mu[c] * s.load[c] * s.along[c, i]
         return
     first, second = against(s.ratio[c], s.along[c])
-    friction = s.mu[c] * (x[0] + s.load[c])
+    friction = s.mu[c] * pressing(s, k)
     x[1], x[2] = -friction * first, -friction * second
 
 
@@ -218,7 +232,7 @@ def begin_to_move(s: ContactArrays, part: float) -> bool:
         more = False
         for k in range(s.closed_count):
             c, a = s.closed[k], s.rates[3 * k : 3 * k + 3]
-            clear_rounding(s, c, ZERO * s.sizes[k], a)
+            clear_rounding(s, k, ZERO * s.sizes[k], a)
             if size_across(s, c, a) > 0.0 and s.slipping[c] == 0:
                 s.slipping[c], more = 1, True
         if not (more and differs):
@@ -226,15 +240,15 @@ def begin_to_move(s: ContactArrays, part: float) -> bool:
 
 
 @compiled
-def clear_rounding(s: ContactArrays, c: int, least: float, a: Floats) -> None:
-    """Put zero for accelerations that are rounding.
+def clear_rounding(s: ContactArrays, k: int, least: float, a: Floats) -> None:
+    """Put zero for accelerations of closed contact k that are rounding.
 
     Less than a part of what friction alone could change is that as well.
     """
-    row, stops = 3 * c, 0.0
+    c, row, stops = s.closed[k], 3 * s.closed[k], 0.0
     if s.alone[c] != 0:
         own = max(s.W[row, row], s.W[row + 1, row + 1], s.W[row + 2, row + 2])
-        stops = ZERO * s.mu_s[c] * s.load[c] * own
+        stops = ZERO * s.mu_s[c] * pressing(s, k) * own
     across = size_across(s, c, a) > max(least, stops)
     if s.gapless[c] == 0.0:
         a[0] = a[0] if abs(a[0]) > least else 0.0

@@ -121,7 +121,8 @@ def take_part(s: ContactArrays, is_last: bool) -> bool:
     for k in range(s.in_touch_count):
         c = s.in_touch[k]
         bounces |= s.e_left[c] > 0.0
-        if s.closing[c] < -AT_REST * s.length[c]:
+        presses = s.under[c] if s.under[c] >= 0 else c
+        if s.closing[presses] < -AT_REST * s.length[presses]:
             s.touching[s.touching_count] = c
             s.touching_count += 1
     if s.touching_count > 0 and (is_last or not bounces):
@@ -219,30 +220,39 @@ def unjam(s: ContactArrays, system: System) -> bool:
 def stop_low_rocking(
     t: float, s: ContactArrays, system: System, loops: Any, functions: Any
 ) -> None:
-    """Hold what would be back from a height too low to tell from rest, as of rocking."""
+    """Hold what would be back from a height too low to tell from rest, as of rocking.
+
+    What is held may lift others as low: they would change places for ever.
+    """
     for c in range(s.state.shape[0]):
         s.is_low[c] = s.role[c] = 0
     for k in range(s.in_touch_count):
+        s.role[s.in_touch[k]] = 2
+    while find_low(t, s, system, loops, functions):
+        hold_low(s, system)
+
+
+@compiled
+def find_low(t: float, s: ContactArrays, system: System, loops: Any, functions: Any) -> bool:
+    """Give role 1 to what comes back from too low, of role 2; False if nothing does."""
+    found = False
+    for k in range(s.in_touch_count):
         c = s.in_touch[k]
         v = s.closing[c]
-        s.role[c] = 2
-        if v > AT_REST * s.length[c]:
+        if s.role[c] == 2 and v > AT_REST * s.length[c]:
             put_free(t, s, system, loops, functions)
             if v * v < -2.0 * LAST_HEIGHT * s.length[c] * s.free[3 * c]:
-                s.is_low[c] = s.role[c] = 1
-    hold_low(s, system)
+                s.is_low[c], s.role[c], found = 1, 1, True
+    return found
 
 
 @compiled
 def hold_low(s: ContactArrays, system: System) -> None:
-    """Stop the contacts of role 1, if there are any, so that none of role 2 approaches."""
-    found = 0
+    """Stop the contacts of role 1 so that none of role 2 approaches."""
     for c in range(s.state.shape[0]):
-        found |= s.role[c] == 1
         s.values[c], s.least[c] = s.closing[c], 0.0
-    if found != 0:
-        lift(s)
-        change(s, system)
+    lift(s)
+    change(s, system)
 
 
 @compiled

@@ -25,8 +25,9 @@ from dap3d_core.kernels.runtime.cache import compiled
 LOOSE = 1.0 - 1e-6
 #: Part of its mobility that friction leaves a contact whose steps become endless: it jams.
 NEARLY = 1e-2
-#: Part of the largest force that is to be left for a contact that stays as others can carry less.
-TO_STAY = 1e-6
+#: Part of the largest force that is to be left for a contact that stays as others can carry less;
+#: and for one that is at the end of its cone: with less it would be there again at once.
+TO_STAY, TO_STICK = 1e-6, 1e-3
 
 
 @compiled
@@ -35,6 +36,8 @@ def put_closed(s: ContactArrays) -> None:
     count = 0
     for k in range(s.touching_count):
         c = s.touching[k]
+        if not is_pressed(s, c, s.kept, count):
+            continue
         if s.gapless[c] > 0.0 or s.slip[c, 0] < still_speed(s, c):
             s.kept[count] = c
             count += 1
@@ -42,6 +45,15 @@ def put_closed(s: ContactArrays) -> None:
     for c in range(s.mode.shape[0]):
         clear_mode(s, c)
         s.jams[c] = 0
+
+
+@compiled
+def is_pressed(s: ContactArrays, c: int, some: Integers, count: int) -> bool:
+    """True but of what resists rolling at a contact that is not among the first of some."""
+    found = s.under[c] < 0
+    for k in range(count):
+        found |= some[k] == s.under[c]
+    return found
 
 
 @compiled
@@ -109,6 +121,7 @@ def put_modes(s: ContactArrays) -> bool:
         if not put_matrix(s, False):
             return False
         if do_share(s) and hold_inside(s) and all_stay(s):
+            leave_few(s)
             return put_found(s, False, True, False)
         put_plain(s)
         if leaves == 0 and do_share(s):
@@ -128,6 +141,27 @@ def all_stay(s: ContactArrays) -> bool:
         if s.leaves[s.closed[k]] != 0 and not s.inner[3 * k] > TO_STAY * largest:
             return False
     return True
+
+
+@compiled
+def leave_few(s: ContactArrays) -> None:
+    """Let go of those at the end of their cones that carry next to nothing, where others hold."""
+    before, largest = s.closed_count, 0.0
+    for k in range(3 * before):
+        largest = max(largest, s.inner[k])
+    s.closed_count = 0
+    for k in range(before):
+        c = s.before[k] = s.closed[k]
+        if s.begins[c] == 0 or s.alone[c] != 0 or s.inner[3 * k] > TO_STICK * largest:
+            s.closed[s.closed_count] = c
+            s.closed_count += 1
+    if s.closed_count == before or (put_matrix(s, False) and hold_inside(s)):
+        return
+    for k in range(before):
+        s.closed[k] = s.before[k]
+    s.closed_count = before
+    put_matrix(s, False)
+    hold_inside(s)
 
 
 @compiled
@@ -152,7 +186,7 @@ def let_leave(s: ContactArrays, count: int) -> None:
         s.closed_count = 0
         for k in range(before):
             c = s.before[k]
-            if leaves[c] != 0:
+            if leaves[c] != 0 or not is_pressed(s, c, s.closed, s.closed_count):
                 s.gone[c] = 1
             else:
                 s.closed[s.closed_count] = c
@@ -189,7 +223,8 @@ def put_returning(s: ContactArrays, least: float) -> int:
             for k in range(without):
                 for i in range(3):
                     rate += s.W[3 * c, 3 * s.closed[k] + i] * s.cone.x[3 * k + i]
-            if rate < least:
+            resists = s.under[c] >= 0 and is_pressed(s, c, s.closed, count)
+            if rate < least or (without == 0 and resists):
                 if without == 0:
                     s.closed[count] = c
                     s.closed_count = count + 1
@@ -215,27 +250,31 @@ def put_found(s: ContactArrays, begins: bool, inner: bool, loose: bool) -> bool:
             s.cone.x[k], s.rates[k] = s.inner[k], 0.0
     elif not begin_to_move(s, LOOSE if loose else 1.0):
         return False
-    largest = 0.0
+    largest, count = 0.0, 0
     for k in range(3 * s.closed_count):
         largest = max(largest, abs(s.cone.x[k]))
     for k in range(s.closed_count):
-        put_one(s, k, shares, ZERO * largest)
+        count += s.cone.under[k] == k
+    for k in range(s.closed_count):
+        if s.under[s.closed[k]] < 0 or s.mode[s.under[s.closed[k]]] > 0.0:
+            put_one(s, k, shares, count == 1, ZERO * largest)
     if shares:
         leave_to_others(s)
     return True
 
 
 @compiled
-def put_one(s: ContactArrays, k: int, shares: bool, least: float) -> None:
+def put_one(s: ContactArrays, k: int, shares: bool, is_one: bool, least: float) -> None:
     """Put the mode of closed contact k, if it stays closed.
 
+    is_one: there is no other, but what resists rolling at it.
     least: friction, N, whose direction is not that of rounding.
     """
     c, force, rate = s.closed[k], s.cone.x[3 * k : 3 * k + 3], s.rates[3 * k : 3 * k + 3]
     alone, opens = s.alone[c] != 0, s.cone.A[3 * k, 3 * k] * force[0]
     if not alone and rate[0] > max(opens, 0.0):
         return
-    if s.closed_count == 1 and not alone and force[0] <= 0.0:
+    if is_one and not alone and force[0] <= 0.0:
         return
     way = s.direction
     way[0] = way[1] = way[2] = 0.0
@@ -256,9 +295,9 @@ def put_one(s: ContactArrays, k: int, shares: bool, least: float) -> None:
         s.force[c, i] = force[i]
         s.way[c, i] = s.near[c, i] = 0.0
         for q in range(3):
-            s.way[c, i] += s.length[c] * way[q] * s.frames[c, q, i]
+            s.way[c, i] += s.length[c] / s.arm[c] * way[q] * s.frames[c, q, i]
             if near and (sticks or (q == 0 and normal)):
-                s.near[c, i] += force[q] * s.frames[c, q, i]
+                s.near[c, i] += s.arm[c] * force[q] * s.frames[c, q, i]
 
 
 @compiled

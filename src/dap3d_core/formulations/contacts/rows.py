@@ -63,8 +63,8 @@ def let_stick(s: ContactArrays, system: System) -> None:
 
 @compiled
 def put_jacobian(s: ContactArrays, system: System) -> None:
-    """Rows of the model, along global axes and scaled."""
-    blocks = system.blocks
+    """Rows of the model, along global axes and scaled; of contacts that turn on their arms."""
+    blocks, own = system.blocks, s.lam_free.shape[0]
     for r in range(s.J.shape[0]):
         zero(s.J[r])
         zero(s.scaled[r])
@@ -74,8 +74,9 @@ def put_jacobian(s: ContactArrays, system: System) -> None:
         for r in range(blocks[q, 2]):
             place = s.model_row[blocks[q, 3] + r]
             from_row, row, scaled = system.D[first + 6 * r :], s.J[place], s.scaled[place]
+            arm = s.arm[(place - own) // 3] if place >= own else 1.0
             for i in range(6):
-                row[o + i] = from_row[i]
+                row[o + i] = arm * from_row[i]
             for i in range(3):
                 scaled[o + i] = k[0] * row[o + i]
                 turning = row[o + 3] * k[7 + i] + row[o + 4] * k[10 + i] + row[o + 5] * k[13 + i]
@@ -155,7 +156,7 @@ def put_frames(s: ContactArrays) -> None:
     """Normal and tangents of each contact, or the axis of a moment; global axes."""
     own = s.lam_free.shape[0]
     for c in range(s.state.shape[0]):
-        o, sign, turns = 6 * s.frame_body[c] - 6, s.frame_sign[c], s.turns[c]
+        o, sign, turns = 6 * s.frame_body[c] - 6, s.frame_sign[c] / s.arm[c], s.turns[c]
         for i in range(3):
             row = s.J[own + 3 * c + i]
             for k in range(3):
@@ -176,6 +177,8 @@ def put_feels(s: ContactArrays) -> None:
             if abs(s.W[i, k]) > FELT * size[i] * size[k]:
                 s.feels[i // 3, k // 3] = 1
     for c in range(m):
+        if s.under[c] >= 0:
+            s.feels[c, s.under[c]] = s.feels[s.under[c], c] = 1
         for r in range(s.load_row[c], s.load_row[c] + s.load_count[c]):
             for k in range(n):
                 if abs(s.reaction[r, k]) > FELT * size[k] * s.unit[r]:
@@ -231,7 +234,7 @@ def put_free(t: float, s: ContactArrays, system: System, loops: Any, functions: 
     call_kinds(ACCELERATION, ACCELERATION, t, system, loops, system.D, system.gamma, system.nu)
     for i in range(s.free.shape[0]):
         rate = along_bodies(i // 3, s.J[own + i], out, system)
-        s.free[i] = rate - system.gamma[system.row[own + i]]
+        s.free[i] = rate - s.arm[i // 3] * system.gamma[system.row[own + i]]
     s.is_free = 1
 
 

@@ -4,7 +4,7 @@
 # mypy: disable-error-code="no-any-return"
 
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
-from dap3d_core.formulations.contacts.forces import largest_entry, put_sizes, solve_forces
+from dap3d_core.formulations.contacts.forces import largest_entry, pressing, put_sizes, solve_forces
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.least_squares import factor_least, solve_least
 
@@ -66,8 +66,14 @@ def hold_inside(s: ContactArrays) -> bool:
     """Forces ``inner`` well within the cones of closed contacts that share, and hold, if any."""
     for k in range(3 * s.closed_count):
         s.cone.x[k] = 0.0
+    resists = False
     for k in range(s.closed_count):
         s.slipping[s.closed[k]] = 0
+        resists |= s.under[s.closed[k]] >= 0
+    if resists and are_held_within(s, 0, 0, 0.0):  # they carry nothing that others can
+        return True
+    for k in range(3 * s.closed_count):
+        s.cone.x[k] = 0.0
     if are_held_within(s, 0, 0):  # as a rule
         return True
     for k in range(3 * s.closed_count):
@@ -95,10 +101,11 @@ def bring_in(s: ContactArrays, part: int) -> int:
 
 
 @compiled
-def are_held_within(s: ContactArrays, part: int, least: int) -> bool:
+def are_held_within(s: ContactArrays, part: int, least: int, resisting: float = 1.0) -> bool:
     """True if forces within a part of the cones hold; these are ``inner`` then.
 
     least: the number of the normal force that each has at least.
+    resisting: 0 where what resists rolling is to carry nothing.
     """
     load, count, left = 0.0, 0, left_of(part)
     for k in range(s.closed_count):
@@ -106,13 +113,13 @@ def are_held_within(s: ContactArrays, part: int, least: int) -> bool:
         if s.alone[c] == 0:
             load, count = max(load, -s.free[3 * c] / s.cone.A[3 * k, 3 * k]), count + 1
     normal = LEAST * left_of(least) * load / count if count > 1 else 0.0
-    solve_forces(s, 1.0 - left, FEW, normal)
+    solve_forces(s, 1.0 - left, FEW, normal, resisting)
     x, A, big = s.cone.x, s.cone.A, put_sizes(s, True)
     for q in range(put_own_rows(s)):
         k = s.rows[q] // 3
         c = s.closed[k]
         own = max(A[3 * k, 3 * k], A[3 * k + 1, 3 * k + 1], A[3 * k + 2, 3 * k + 2])
-        carried = s.mu_s[c] * (x[3 * k] + s.load[c])
+        carried = s.mu_s[c] * pressing(s, k)
         rest = OF_REST * left * own * carried + RATE_ROUNDING * big
         if not abs(s.rates[s.rows[q]]) <= min(HELD * s.sizes[k], rest):
             return False

@@ -14,7 +14,6 @@ from dap3d_core.assembly.collisions.placed_shapes import (
 )
 from dap3d_core.formulations.contacts.contact_table import ContactTable
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.interface.contacts.contact import RESISTED
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays, Scalar
 from dap3d_core.model import Model
@@ -61,7 +60,8 @@ class StepArrays(Arrays):
     types: ClassVar[dict[str, Any]] = {
         **dict.fromkeys(
             ("integer", "key", "kind", "under", "group", "chosen", "collides", "declared_gap",
-             "declared_mode", "declared_kind", "declared_turns", "declared_law", "load_row",
+             "declared_mode", "declared_kind", "declared_turns", "declared_law", "declared_under",
+             "declared_at", "load_row",
              "load_count", "load_pushes", "held",
              "row_start", "row_body", "row_place", "used", "place", "parent", "queue", "order",
              "entry_start", "entries", "bits", "slots", "exchanged"),
@@ -188,12 +188,12 @@ class StepArrays(Arrays):
     declared_mu_s: Floats
     declared_ratio: Floats  # the same along the second tangent, as parts of these: 1 but in
     declared_ratio_s: Floats  # ellipses
-    declared_mu_roll: Floats  # m
-    declared_mu_spin: Floats
+    declared_under: Integers  # of what resists rolling the contact that presses, or -1
+    declared_at: Integers  # where it is among the contacts of a step, or -1
     declared_e: Floats
     held: Integers  # 1 where it has stuck until this step
-    grip: Floats  # coefficient that counts now, and ratio, by which the second row is multiplied
-    ratio: Floats
+    grip: Floats  # coefficient that counts now, m of what resists rolling, and ratio, by which the
+    ratio: Floats  # second row is multiplied
     load_row: Integers  # of friction of a joint: its load's first row, their number, whether it
     load_count: Integers  # pushes alone; none where friction is of a size of its own
     load_pushes: Integers
@@ -264,7 +264,8 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
     arrays.dense_size, arrays.length = dense_size, model.length
     arrays.first_v_dot, arrays.first_lam = layout["v_dot"].start, layout["Lam"].start
     arrays.first_state = layout["states"].start
-    arrays.resistance_count = 2 if model.resists_turning else 0
+    if model.collisions is not None and model.collisions.resists_turning:
+        arrays.resistance_count = 2
     _put_carried(arrays)
     return arrays
 
@@ -360,16 +361,16 @@ def _declared(evaluator: Evaluator) -> dict[str, Any]:
         "declared_place": places,
         "declared_gap": np.ascontiguousarray(evaluator.system.row[own::3][:d]),
         **{name: np.zeros(d, dtype=np.int64) for name in (
-            "declared_mode", "declared_kind", "declared_turns", "declared_law", "held",
-            "load_row", "load_count", "load_pushes")},
+            "declared_mode", "declared_kind", "declared_turns", "declared_law", "declared_under",
+            "declared_at", "held", "load_row", "load_count", "load_pushes")},
         **{name: np.zeros(d) for name in (
-            "declared_mu", "declared_mu_s", "declared_mu_roll", "declared_mu_spin", "declared_e",
-            "grip")},
+            "declared_mu", "declared_mu_s", "declared_e", "grip")},
         **{name: np.ones(d) for name in ("declared_ratio", "declared_ratio_s", "ratio")},
         "declared_x": np.zeros((d, 7)),
     }  # fmt: skip
     if table is not None:
         found |= {"declared_mode": table.mode, "declared_mu": table.mu, "declared_e": table.e}
+        found |= {"declared_under": table.under}
         found |= {"declared_mu_s": table.mu_s, "declared_turns": table.turns.astype(np.int64)}
         found["declared_kind"] = np.where(table.alone, np.where(table.holds[:, 0], WHOLE, ALONE),
                                           CONE)  # fmt: skip
@@ -377,8 +378,6 @@ def _declared(evaluator: Evaluator) -> dict[str, Any]:
         for group in model.contacts:
             type_: Any = group.type_info.type
             found["declared_law"][group.members - first] = type_.grip is not None
-            for name in RESISTED:
-                found[f"declared_{name}"][group.members - first] = group.number(name)
         for c, (rows, pushes) in table.loads.items():
             found["load_row"][c], found["load_count"][c] = rows[0], len(rows)
             found["load_pushes"][c] = pushes

@@ -16,6 +16,7 @@ from dap3d_core.formulations.contacts.equations import (
     NUMBERS,
     ROW,
     STATE,
+    UNDER,
 )
 from dap3d_core.integrators.moreau.arrays import ALONE, CONE, StepArrays
 from dap3d_core.interface.contacts.rows import FAR_APART, SLIDES, STEPPED
@@ -57,15 +58,19 @@ def find_contacts(
     if s.declared_gap.size > 0:
         evaluate_rows(t, y, s, system, loops)
         for k in range(s.declared_gap.size):
-            if s.declared_kind[k] != CONE:
+            u = s.declared_under[k]
+            if u >= 0:
+                near = most >= FAR_APART and s.declared_at[u] >= 0
+            elif s.declared_kind[k] != CONE:
                 near = most >= FAR_APART
             else:
                 near = system.residual[s.declared_gap[k]] < most
+            s.declared_at[k] = s.contact_count if near else -1
             if near:
                 put_declared(k, s, system)
     s.law_count = s.contact_count
     if s.resistance_count > 0 and most >= FAR_APART:
-        for c in range(s.law_count):
+        for c in range(s.touch_count):
             put_resistances(c, s)
     return True
 
@@ -132,15 +137,11 @@ def put_touch(c: int, s: StepArrays) -> None:
 
 @compiled
 def put_resistances(c: int, s: StepArrays) -> None:
-    """Append contacts of what resists rolling and spinning at contact c."""
-    shapes, roll, spin = s.shapes, 0.0, 0.0
-    if c >= s.touch_count:
-        k = s.key[c] - DECLARED
-        roll, spin = s.declared_mu_roll[k], s.declared_mu_spin[k]
-    else:
-        i, j = shapes.material[shapes.which[c, 0]], shapes.material[shapes.which[c, 1]]
-        roll = shapes.mu_roll[i, j] if shapes.mu_roll.size > 0 else 0.0
-        spin = shapes.mu_spin[i, j] if shapes.mu_spin.size > 0 else 0.0
+    """Append contacts of what resists rolling and spinning where shapes touch at contact c."""
+    shapes = s.shapes
+    i, j = shapes.material[shapes.which[c, 0]], shapes.material[shapes.which[c, 1]]
+    roll = shapes.mu_roll[i, j] if shapes.mu_roll.size > 0 else 0.0
+    spin = shapes.mu_spin[i, j] if shapes.mu_spin.size > 0 else 0.0
     if roll > 0.0:
         put_resistance(c, ROLLS, s)
         put_turning(c, 1, roll, 1, s)
@@ -216,11 +217,16 @@ def evaluate_rows(t: float, y: Floats, s: StepArrays, system: System, loops: Any
 def find_grips(t: float, s: StepArrays, system: System, loops: Any) -> None:
     """Find coefficients of contacts whose law of friction is their own, at slip of ``before``.
 
-    They are the friction that a normal force of one has at a slip along either tangent.
+    They are the friction that a normal force of one has at a slip along either tangent. Of what
+    resists rolling it is a length, by which rows are multiplied: as of ``put_turning``.
     """
     for c in range(s.touch_count, s.law_count):
         k = s.key[c] - DECLARED
-        if s.declared_law[k] != 0:
+        if s.under[c] >= 0:
+            s.grip[k] = friction_at(t, s, c, 1, 0.0, system, loops)
+            for i in range(12, 36):
+                s.J[c, i] *= s.grip[k]
+        elif s.declared_law[k] != 0:
             _, u1, u2 = velocity_of(s, c, s.before)
             speed = math.sqrt(u1 * u1 + u2 * u2)
             slides, sticks = (friction_at(t, s, c, 1, speed, system, loops),
@@ -237,13 +243,14 @@ def friction_at(
     t: float, s: StepArrays, c: int, along: int, speed: float, system: System, loops: Any
 ) -> float:
     """Friction of a normal force of one where a contact slides along a tangent, 1 or 2."""
-    row, J, x = system.contacts[s.key[c] - DECLARED], s.J[c], pointer(system.multipliers)
+    number = s.key[c] - DECLARED
+    row, J, x = system.contacts[number], s.J[c], pointer(system.multipliers)
     loop, force, first = loops[row[LOOP]], s.rest, row[STATE]
-    side = 0 if row[BODY_I] > 0 else 1
+    side, turns = 0 if row[BODY_I] > 0 else 1, 3 * s.declared_turns[number]
     b, sign = row[BODY_I + side], 1.0 - 2.0 * side
-    e = J[12 * along + 6 * side :]
+    e, presses = J[12 * along + 6 * side + turns :], system.contacts[row[UNDER], ROW]
     for k in range(3):
-        system.multipliers[row[ROW] + k] = -1.0 if k == 0 else 0.0
+        system.multipliers[presses + k] = -1.0 if k == 0 else 0.0
         system.states[first + 1 + k] = sign * e[k]
     system.states[first] = SLIDES
     for one in range(2):
@@ -251,12 +258,12 @@ def friction_at(
         for k in range(6):
             s.trial[moved, k], velocity[12 + k] = velocity[12 + k], 0.0
             force[moved, k] = 0.0
-    for k in range(3):
+    for k in range(3 if speed > 0.0 else 0):
         system.body[b, 12 + k] = speed * e[k]
     loop(t, system, row[INTEGERS], row[NUMBERS], 1, pointer(force), x, x)
     found = 0.0
     for k in range(3):
-        found -= e[k] * force[b, k]
+        found -= e[k] * force[b, turns + k]
     for one in range(2):
         moved, velocity = row[BODY_I + one], system.body[row[BODY_I + one]]
         for k in range(6):
@@ -283,6 +290,8 @@ def put_declared(k: int, s: StepArrays, system: System) -> None:
     s.contact_count = c + 1
     s.bodies[c, 0], s.bodies[c, 1] = s.declared_bodies[k, 0], s.declared_bodies[k, 1]
     s.key[c], s.gap[c], s.kind[c], s.under[c] = DECLARED + k, 0.0, s.declared_kind[k], -1
+    if s.declared_under[k] >= 0:
+        s.under[c] = s.declared_at[s.declared_under[k]]
     s.mu[c], s.e[c], s.ratio[k] = 0.0, s.declared_e[k], 1.0
     if s.kind[c] == CONE:
         s.gap[c], s.mu[c] = system.residual[s.declared_gap[k]], s.declared_mu[k]

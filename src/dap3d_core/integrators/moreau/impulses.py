@@ -73,6 +73,8 @@ def recall(work: Any, s: StepArrays) -> None:
 def put_grip(s: StepArrays, c: int, holds: bool) -> None:
     """Let a declared contact have the coefficient of what sticks, or slides."""
     k = s.key[c] - DECLARED
+    if s.under[c] >= 0:
+        return
     s.held[k] = 1 if holds else 0
     s.grip[k] = s.declared_mu_s[k] if holds else s.declared_mu[k]
     s.mu[c] = s.grip[k] if s.kind[c] == CONE else 0.0
@@ -135,7 +137,9 @@ def keep_for_reports(s: StepArrays) -> None:
         d, x, J = s.key[c] - DECLARED, s.x[c], s.J[c]
         kept, sign = s.declared_x[d], -1.0 if s.bodies[c, 0] > 0 else 1.0
         axis = J[3 * s.declared_turns[d] + (0 if sign < 0.0 else 6) :]
-        kept[0], kept[1], kept[2], kept[3] = x[0], x[1], s.ratio[d] * x[2], mode_of(s, c)
+        arm = s.grip[d] if s.under[c] >= 0 else 1.0
+        kept[0], kept[1], kept[2] = x[0], arm * x[1], arm * s.ratio[d] * x[2]
+        kept[3] = mode_of(s, c)
         for k in range(3):
             kept[4 + k] = 0.0
             for r in range(3 if s.kind[c] != CONE and kept[3] == SLIDES else 0):

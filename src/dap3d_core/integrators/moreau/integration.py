@@ -90,8 +90,9 @@ class MoreauIntegration(Integration):
         """As ``Integration.own_arrays``."""
         model = self._evaluator.model
         shapes = 0 if model.collisions is None else np.count_nonzero(model.collisions.body)
-        laws = 3 if model.resists_turning else 1  # of a contact: friction, rolling, spinning
-        memory = np.full((laws * (KEPT * shapes + model.contact_count), 5), -1.0)
+        if model.collisions is not None and model.collisions.resists_turning:
+            shapes *= 3  # friction, rolling, spinning
+        memory = np.full((KEPT * shapes + model.contact_count, 5), -1.0)
         pushed = np.zeros((model.body_count + 1, 6))
         return {
             "memory": memory,

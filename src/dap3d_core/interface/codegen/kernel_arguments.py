@@ -112,10 +112,14 @@ def namespace(type_: type[TypeBase], layout: InstanceLayout) -> dict[str, Kernel
         lam = f"({''.join(f'-out3[row + {k}], ' for k in range(3))})"
         offer("lam", (3,), lam, velocity=True, doc="its multipliers", derivable=False)
         if load := type_.load:  # type: ignore[attr-defined]
-            joint = f"idx[b0 + {layout.integers + 1 + len(layout.slots)}]"
+            at = layout.integers + 1 + len(layout.slots)
+            joint = f"idx[b0 + {at}]"
             lam = f"({''.join(f'-out3[{joint} + {k}], ' for k in load)})"
             doc = "multipliers of the joint that press its surfaces"
             offer("lam_load", (len(load),), lam, velocity=True, doc=doc, derivable=False)
+        if type_.resists:  # type: ignore[attr-defined]
+            near = f"({''.join(f'states[idx[b0 + {at + 1}] + {k}], ' for k in range(3))})"
+            offer("near_load", (3,), near, doc="share of the contact", derivable=False)
     for name, (at, shape) in layout.states.items():
         offer(name, shape, _state(at, shape), doc="state of the element", derivable=False)
     return names

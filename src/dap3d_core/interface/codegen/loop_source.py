@@ -3,9 +3,9 @@
 The integers of an instance are in ``idx`` from ``b0``: the bodies of its slots, the rows of F of
 its functions, the bodies of its vectors of no slot, the index of its first state where it has
 states of its own, then for a joint the index of its first row in the row vectors and for each slot
-that of its block in D, of its friction then the first row of the joint, and for a force those of
-the joints whose reactions it reads; its numbers
-are in ``par`` from ``p1``.
+that of its block in D, of its friction then the first row of the joint, of what resists rolling
+that of its contact and the first state of the share of that, and for a force those of the joints
+whose reactions it reads; its numbers are in ``par`` from ``p1``.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -46,7 +46,9 @@ def stride(type_info: TypeInfo) -> int:
     """Number of integers of an instance in ``idx``."""
     n = type_info.layout.integers
     if type_info.type.kind == "joint":
-        return n + 1 + len(type_info.layout.slots) + bool(getattr(type_info.type, "load", ()))
+        type_: Any = type_info.type
+        of_load = (bool(type_.load) + bool(type_.resists)) if type_.is_contact else 0
+        return n + 1 + len(type_info.layout.slots) + of_load
     if type_info.type.kind == "function":
         return n + 1
     return n + integers_of_joints(type_info)

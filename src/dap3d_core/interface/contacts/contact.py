@@ -5,17 +5,16 @@ from inspect import signature
 from itertools import pairwise
 from typing import Any, ClassVar
 
+from dap3d_core.interface.contacts.resistance import RESISTED
 from dap3d_core.interface.fields import FieldSpec, choice, field_of, number, slot_of
 from dap3d_core.interface.types import Joint, TypeBase
 
 #: What authors define.
 DECLARED = ("gap", "normal")
 #: What they may define besides.
-OPTIONAL = ("at", "reach", "along", "grip", "grain")
+OPTIONAL = ("at", "reach", "along", "grip", "grain", "resist")
 #: Fields that a material gives.
 MATERIAL = ("mu", "mu_s", "mu_roll", "mu_spin", "e", "law")
-#: Fields of lengths by which contacts resist how bodies turn.
-RESISTED = {"mu_roll": "rolling", "mu_spin": "spinning"}
 #: Values of ``law``.
 LAWS = ("poisson", "newton")
 #: Initial mode of a contact that touches as the scene is assembled.
@@ -53,6 +52,10 @@ class Contact(Joint):
     position level, and across it: friction is within the ellipse of both. It has fields mu and mu_s
     if it names them.
 
+    Moments resist that bodies roll and spin over each other, up to lengths times the normal force:
+    ``resist`` returns those of rolling and of spinning about the normal, m. Without it they are
+    the fields mu_roll and mu_spin; it has these fields if it names them.
+
     Dry friction of a size of its own, as of seals, has no gap and no normal, but ``along``: the
     unit vector that body i slides along at the point ``at``, or without that turns about.
     ``prepare`` returns what it is where it slides, ``mu``, and the most where it sticks, ``mu_s``,
@@ -78,6 +81,7 @@ class Contact(Joint):
         shared: of a variant of a force, the fields of that force that it has, too.
         load: of friction of a joint, adjacent rows of the joint.
         pushes: that load is of one row, and none where that pulls.
+        resists: of what resists at another contact (resistance.py), "roll" or "spin".
         holds: which of its three rows act where it sticks.
     """
 
@@ -93,10 +97,12 @@ class Contact(Joint):
     shared: ClassVar[tuple[str, ...]] = ()
     load: ClassVar[tuple[int, ...]] = ()
     pushes: ClassVar[bool] = False
+    resists: ClassVar[str] = ""
     holds: ClassVar[tuple[bool, bool, bool]] = (True, True, True)
     at: ClassVar[Any] = None
     along: ClassVar[Any] = None
     grip: ClassVar[Any] = None
+    resist: ClassVar[Any] = None
     normal: ClassVar[Any] = None
 
     def __init_subclass__(cls, of: type[TypeBase] | None = None, **conditions: Any) -> None:
@@ -129,6 +135,11 @@ class Contact(Joint):
         return super().kernels()
 
     @classmethod
+    def has_law(cls) -> bool:
+        """True if what it says ends with coefficients, which kernels find."""
+        return cls.grip is not None or bool(cls.resists)
+
+    @classmethod
     def is_friction_alone(cls) -> bool:
         """True of what has no gap: it slides or sticks, and is never open."""
         return bool(cls.load) or cls.along is not None
@@ -137,7 +148,7 @@ class Contact(Joint):
         """The coefficient of sticking friction where it is that of sliding, those of moments."""
         given: Any = self
         mu_s = given.mu if given.mu_s is None else given.mu_s
-        if not self.load:
+        if not self.load or self.resists:
             return {"mu_s": mu_s}
         arm = 1.0 if self.at is not None else given.radius
         return {"mu": arm * given.mu, "mu_s": arm * mu_s}
@@ -159,18 +170,21 @@ def _add_material(class_: type) -> None:
         "touch": choice((False, True), False, doc="the bodies are moved until they touch at t = 0"),
     }
     if class_.at is not None:  # type: ignore[attr-defined]
-        fields |= {name: number(0.0, minimum=0.0, unit="m", doc=f"moment against {what} over the "
-                                "force that presses, by stepping alone")
-                   for name, what in RESISTED.items()}  # fmt: skip
+        for name, what in RESISTED.values():
+            doc = f"moment against {what} over the force that presses"
+            fields[name] = number(0.0, minimum=0.0, unit="m", doc=doc)
     alone = class_.is_friction_alone()  # type: ignore[attr-defined]
     if class_.is_smooth or alone:  # type: ignore[attr-defined]
         fields = {name: hidden(0.0) for name in ("e", "mu", "mu_s")}
         fields |= {} if alone else {"e": e}
-        if class_.load and class_.at is None:  # type: ignore[attr-defined]
+        if class_.load and class_.at is None and not class_.resists:  # type: ignore[attr-defined]
             fields["radius"] = hidden(1.0)
     if class_.grip is not None:  # type: ignore[attr-defined]
         unread = {"mu", "mu_s"} - set(signature(class_.grip).parameters)  # type: ignore[attr-defined]
         fields |= {name: hidden(0.0) for name in unread}
+    if class_.resist is not None:  # type: ignore[attr-defined]
+        read = signature(class_.resist).parameters  # type: ignore[attr-defined]
+        fields |= {name: hidden(0.0) for name, _ in RESISTED.values() if name not in read}
     fields |= {name: hidden(value) for name, value in HIDDEN.items()}
     _add_fields(class_, fields)
 
@@ -243,7 +257,8 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
 
     special: dict[str, Any] = rows.TURNING if "at" not in declared else {}
     if class_.load:
-        special = loaded.kernels_of(calls, wanted, every, pushes=class_.pushes, has_j=has_j)
+        how = class_.resists or ("push" if class_.pushes else "")
+        special = loaded.kernels_of(calls, wanted, every, how=how, has_j=has_j)
     elif "along" in declared:
         special = grips.KERNELS if "at" in declared else grips.TURNING
     if special:
@@ -294,6 +309,9 @@ def _expressions(
     else:
         wanted |= {"grip": ["mu"], "hold": ["mu_s"]}
         calls |= {"grip": "lambda speed: mu", "hold": "mu_s"}
+    if "resist" in declared:
+        wanted["resist"] = list(parameters(declared["resist"]))
+        calls["resist"] = f"resist__({', '.join(wanted['resist'])})"
     return calls, wanted
 
 

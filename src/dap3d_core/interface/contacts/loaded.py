@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dap3d_core.interface.contacts.grips import sense
+from dap3d_core.interface.contacts.resistance import RESISTED
 from dap3d_core.interface.contacts.rows import (
     across,
     closed,
@@ -68,25 +69,45 @@ def pressed(lam):
     return where(lam[0] > 0.0, lam[0], 0.0)
 
 
+def carried(lam, near, n):
+    """The normal force that a contact presses with, with its share."""
+    return lam[0] + dot(near, n)
+
+
+def rolling(lengths):
+    """Of lengths that resist that of rolling."""
+    return lengths[0]
+
+
+def spinning(lengths):
+    """Of lengths that resist that of spinning."""
+    return lengths[1]
+
+
 FUNCTIONS: dict[str, Any] = {
     f"{f.__name__}__": f
-    for f in (line, plane, plane_rates, every, toward, size, pressed, direction, across, slip_of,
-              sub)
+    for f in (line, plane, plane_rates, every, toward, size, pressed, carried, rolling, spinning,
+              direction, across, slip_of, sub)
 }  # fmt: skip
 
 
-def expressions(calls: Mapping[str, str], *, pushes: bool) -> dict[str, str]:
+def expressions(calls: Mapping[str, str], how: str) -> dict[str, str]:
     """Expressions for what kernels name here, from those of the declared functions.
 
     Args:
-        calls: expressions of c, n, e and their rates, where they are declared.
-        pushes: the load is of one row, and none where that pulls.
+        calls: expressions of c, n, e and their rates, where they are declared, and of lengths.
+        how: "push": the load is of one row, and none where that pulls; "roll", "spin": the normal
+            force of a contact, which resists this.
     """
     bodies = [calls.get(name, name) for name in ("r_j", "v_j", "w_j")]
     u = f"sub__(w_i, {bodies[2]})"
     if "c" in calls:
         u = f"slip_of__({calls['c']}, r_i, v_i, w_i, {', '.join(bodies)})"
-    found = {"u": u, "load": "pressed__(lam_load)" if pushes else "size__(lam_load)"}
+    found = {"u": u, "load": "pressed__(lam_load)" if how == "push" else "size__(lam_load)"}
+    if how in RESISTED:
+        n = calls["n"] if "n" in calls else calls["e"]
+        mu = f"{RESISTED[how][1]}__({calls['resist']})"
+        found |= {"load": f"carried__(lam_load, near_load, {n})", "mu": mu, "mu_s": mu}
     if "e" in calls:
         way = f"toward__({calls['e']}, way)"
         axes, rates = f"line__({calls['e']})", f"line__({calls['e_dot']})"
@@ -107,15 +128,21 @@ def expressions(calls: Mapping[str, str], *, pushes: bool) -> dict[str, str]:
     }
 
 
-def needs(wanted: Mapping[str, Sequence[str]], calls: Mapping[str, str]) -> dict[str, list[str]]:
+def needs(
+    wanted: Mapping[str, Sequence[str]], calls: Mapping[str, str], how: str
+) -> dict[str, list[str]]:
     """Names that the expressions take, from those that c, n, e and their rates take."""
     bodies = ["r_i", "v_i", "w_i", *(n for n in ("r_j", "v_j", "w_j") if n not in calls)]
     u = [*wanted.get("c", ()), *bodies] if "c" in calls else [n for n in bodies if n[0] == "w"]
     axis = [*wanted.get("e", ()), *wanted.get("n", ())]
     rates = [*axis, *wanted.get("e_dot", ()), *wanted.get("n_dot", ())]
     ahead = [*axis, "way"] if "e" in calls else [*u, *axis, "way"]
-    return {"u": u, "load": ["lam_load"], "axes": axis, "axes_dot": rates, "ahead": ahead,
-            "toward": [*axis, "way"]}  # fmt: skip
+    found = {"u": u, "load": ["lam_load"], "axes": axis, "axes_dot": rates, "ahead": ahead,
+             "toward": [*axis, "way"]}  # fmt: skip
+    if how in RESISTED:
+        found |= dict.fromkeys(("mu", "mu_s"), list(wanted["resist"]))
+        found["load"] = ["lam_load", "near_load", *axis]
+    return found
 
 
 def holding(axes, mode, way):
@@ -141,6 +168,11 @@ def turning_blocks(axes, mode, way):
     """J of both bodies."""
     on = holding(axes, mode, way)
     return tuple(row(_ZERO, e) for e in on), tuple(row(_ZERO, neg(e)) for e in on)
+
+
+def turning_block(axes, mode, way):
+    """J of a contact of one body with ground."""
+    return turning_blocks(axes, mode, way)[0]
 
 
 def gamma(axes, axes_dot, u, c_dot, v_i, w_i, v_j, w_j, mode, way):
@@ -191,6 +223,11 @@ def turning_friction(axes, ahead, load, mu, mode, near):
     return (_ZERO, M), (_ZERO, neg(M))
 
 
+def turning_friction_of_one(axes, ahead, load, mu, mode, near):
+    """The same of a contact of one body with ground."""
+    return turning_friction(axes, ahead, load, mu, mode, near)[0]
+
+
 def switch(axes, u, ahead, toward, lam, load, mu, mu_s, mode, near):
     """What ends a mode where it is negative: nothing; slip, or the rest of the cone."""
     T = whole(axes, ahead, lam, load, mu, mode, near)
@@ -211,28 +248,37 @@ def turning_output(axes, u, ahead, lam, load, mu, mode, near):
     return (0.0, load, *T, *projected(axes, u), *_ZERO, 1.0, *_ZERO)
 
 
+def resisting_output(axes, u, ahead, lam, load, mu, mu_s, mode, near):
+    """The same, and coefficients as of a law of friction."""
+    return (*turning_output(axes, u, ahead, lam, load, mu, mode, near), mu, mu, mu_s, mu_s)
+
+
 KERNELS = {"J": blocks, "gamma": gamma, "friction": friction, "switch": switch,
            "rate": rate, "tension": output}  # fmt: skip
 OF_ONE = KERNELS | {"J": block, "friction": friction_of_one}
 TURNING = {"J": turning_blocks, "gamma": turning_gamma, "rate": rate, "friction": turning_friction,
            "switch": switch, "tension": turning_output}  # fmt: skip
+RESISTING = TURNING | {"tension": resisting_output}
+RESISTING_ON_ONE = RESISTING | {"J": turning_block, "friction": turning_friction_of_one}
 
 
 def kernels_of(
     calls: dict[str, str], wanted: dict[str, list[str]], every: dict[str, Any],
-    *, pushes: bool, has_j: bool,
+    *, how: str, has_j: bool,
 ) -> dict[str, Any]:  # fmt: skip
     """The kernels of the friction of a joint.
 
     Args:
         calls, wanted: expressions, and the names that they take, to which those of here are added.
         every: functions that expressions call; as well.
-        pushes: the load is of one row, and none where that pulls.
+        how: as of ``expressions``.
         has_j: there are two bodies.
     """
-    wanted |= needs(wanted, calls)
-    calls |= expressions(calls, pushes=pushes)
+    wanted |= needs(wanted, calls, how)
+    calls |= expressions(calls, how)
     every |= FUNCTIONS
+    if how in RESISTED:
+        return RESISTING if has_j else RESISTING_ON_ONE
     if "c" not in calls:
         return TURNING
     return KERNELS if has_j else OF_ONE

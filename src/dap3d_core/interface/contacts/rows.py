@@ -22,6 +22,8 @@ STILL_IN_ELLIPSE = 1e-10
 APART = 1.0
 #: The same in time stepping, which leaves out what is as far apart.
 FAR_APART = 1e300
+#: z of normals below which tangents have signs of their own: of no floor, wall or ceiling.
+TURNED = -0.43
 _ZERO = (0.0, 0.0, 0.0)
 _NONE = row(_ZERO, _ZERO)
 
@@ -44,16 +46,19 @@ def holds(mode, way, k):
     return held(mode) & (way[k] < 0.5)
 
 
-def axis(n):
-    """The axis of ground that a normal is farthest from."""
-    x, y, z = (c * c for c in n)
-    first = (x <= y) & (x <= z)
-    return where(first, (1.0, 0.0, 0.0), where(y <= z, (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
-
-
 def tangents(n, grain=None):
-    """Two unit vectors across a normal, the first along a grain; None: any two."""
-    a = cross(n, axis(n)) if grain is None else across(grain, n)
+    """Two unit vectors across a normal, the first along a grain; None: any two.
+
+    Of a normal that turns they turn smoothly, but where it passes TURNED (Duff et al., Building an
+    orthonormal basis, revisited, J. Comput. Graph. Tech. 6, 2017): multipliers along axes that
+    change with rounding would keep an implicit step from converging.
+    """
+    if grain is None:
+        x, y, z = n
+        up = where(z < TURNED, -1.0, 1.0)
+        a = -1.0 / (up + z)
+        return (1.0 + up * x * x * a, up * x * y * a, -up * x), (x * y * a, up + y * y * a, -y)
+    a = across(grain, n)
     first = scale(1.0 / sqrt(dot(a, a)), a)
     return first, cross(n, first)
 
@@ -61,10 +66,16 @@ def tangents(n, grain=None):
 def tangent_rates(n, n_dot, grain=None, grain_dot=None):
     """Rates of ``tangents``."""
     if grain is None:
-        a, a_dot = cross(n, axis(n)), cross(n_dot, axis(n))
-    else:
-        a, turn = across(grain, n), dot(grain_dot, n) + dot(grain, n_dot)
-        a_dot = sub(sub(grain_dot, scale(turn, n)), scale(dot(grain, n), n_dot))
+        (x, y, z), (x_dot, y_dot, z_dot) = n, n_dot
+        up = where(z < TURNED, -1.0, 1.0)
+        a = -1.0 / (up + z)
+        a_dot = a * a * z_dot
+        xy_dot = (x_dot * y + x * y_dot) * a + x * y * a_dot
+        xx_dot = 2.0 * x * x_dot * a + x * x * a_dot
+        yy_dot = 2.0 * y * y_dot * a + y * y * a_dot
+        return (up * xx_dot, up * xy_dot, -up * x_dot), (xy_dot, yy_dot, -y_dot)
+    a, turn = across(grain, n), dot(grain_dot, n) + dot(grain, n_dot)
+    a_dot = sub(sub(grain_dot, scale(turn, n)), scale(dot(grain, n), n_dot))
     size = sqrt(dot(a, a))
     first = scale(1.0 / size, a)
     first_dot = scale(1.0 / size, sub(a_dot, scale(dot(first, a_dot), first)))
@@ -140,11 +151,12 @@ def direction(slip, n, way, still=STILL):
     Of slow slip that in which sliding began has a part, of (still / |u|)^3 soon: slip that turns
     while it is next to nothing would ask for steps as short as that.
     """
-    u, w = across(slip, n), unit(across(way, n))
-    square, still = dot(u, u), still * sqrt(dot(way, way))
-    back = where(dot(u, w) < 0.0, dot(u, w), 0.0)
-    least = where(still > 0.0, still, 1.0)
-    return unit(add(u, scale(least**3 / (least * least + square) - 2.0 * back, w)))
+    u, w = across(slip, n), across(way, n)
+    square, ahead = dot(w, w), dot(u, w)
+    slow = still * still * square + dot(u, u)
+    size = where(square > 0.0, square * slow, 1.0)  # u and its change times that: no division
+    part = still**3 * square * square - where(ahead < 0.0, 2.0 * ahead, 0.0) * slow
+    return unit(add(scale(size, u), scale(part, w)))
 
 
 def sliding(u, n, grain, grip, way):

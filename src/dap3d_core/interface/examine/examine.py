@@ -480,6 +480,8 @@ def _expected(
     if kernel in ("switch", "tension", "grip"):
         shape = (len(value),) if isinstance(value, tuple) and value else ()
         return shape, "one number, or a tuple of numbers"
+    if kernel == "resist":
+        return (2,), "2 numbers, lengths of rolling and of spinning"
     if kernel in ("wrench", "friction"):
         return (slots, 2, 3), f"(force, moment) for each of {slots} bodies"
     if issubclass(type_, Function):

@@ -216,13 +216,15 @@ class Joint:
 
 @attrs.frozen(eq=False)
 class Coupling:
-    """A coordinate that follows another: q = offset + ratio q_of_other.
+    """A coordinate that follows another: q = offset + ratio q_of_other, or a polynomial of it.
 
     Attributes:
         name: its name in the file, or "".
         joint, other: names of joints with one coordinate.
         ratio, offset: see above.
         place: its place in the file.
+        curve: coefficients of a polynomial; ratio and offset are then of its tangent at 0, and of
+            a model with a start at that.
     """
 
     name: str
@@ -231,6 +233,25 @@ class Coupling:
     ratio: float = 1.0
     offset: float = 0.0
     place: Place = NOWHERE
+    curve: tuple[float, ...] = ()
+
+    def at(self, q: float) -> float:
+        """The coordinate that follows, for one of the other joint."""
+        if self.curve:
+            return float(np.polynomial.polynomial.polyval(q, self.curve))
+        return self.offset + self.ratio * q
+
+    def tangent(self, q: float) -> "Coupling":
+        """The coupling with the ratio and offset of its tangent at a coordinate of the other."""
+        if not self.curve:
+            return self
+        slope = float(self.slopes(q)[0])
+        return attrs.evolve(self, ratio=slope, offset=self.at(q) - slope * q)
+
+    def slopes(self, q: float) -> "Floats":
+        """Coefficients of the ratio as a polynomial of what the other moves on from q."""
+        powers = np.polynomial.Polynomial(self.curve or (self.offset, self.ratio))
+        return np.asarray(powers(np.polynomial.Polynomial([q, 1.0])).deriv().coef)
 
 
 @attrs.frozen(eq=False)

@@ -60,17 +60,31 @@ class JointInertia:
 
     def of_sum(self, factors: Mapping[str, float]) -> float | None:
         """The inertia of a sum of coordinates, each of a joint that has one, as ``of``."""
-        if self._modes is None or not factors.keys() <= self._columns.keys():
+        along = self._along(factors)
+        if self._modes is None or along is None:
+            return None
+        free, inverse, _ = self._modes
+        left = free.T @ along
+        yields = float(left @ inverse @ left)
+        return 1.0 / yields if yields > DEPENDENT * float(along @ along) else None
+
+    def acceleration_of(self, factors: Mapping[str, float]) -> float | None:
+        """The length of the accelerations of all coordinates by a force of 1 along a sum."""
+        along = self._along(factors)
+        if self._modes is None or along is None:
             return None
         free, inverse, scale = self._modes
+        return float(np.linalg.norm(free @ inverse @ free.T @ along / scale))
+
+    def _along(self, factors: Mapping[str, float]) -> Floats | None:
+        """A sum of coordinates, each of a joint that has one, in those that are scaled."""
+        if self._modes is None or not factors.keys() <= self._columns.keys():
+            return None
+        scale = self._modes[2]
         along = np.zeros(len(scale))
         for name, factor in factors.items():
             along[self._columns[name]] += factor
-        left = free.T @ (along / scale)
-        yields = float(left @ inverse @ left)
-        return (
-            1.0 / yields if yields > DEPENDENT * float((along / scale) @ (along / scale)) else None
-        )
+        return along / scale
 
     @cached_property
     def _columns(self) -> dict[str, slice]:

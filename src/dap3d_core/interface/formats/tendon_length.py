@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from dap3d_core.interface.formats.articulation import Tendon
 from dap3d_core.interface.formats.frames import Frame
+from dap3d_core.interface.formats.remarks import FormatError
 from dap3d_core.kernels.wrapping import INSIDE, PAST_SIDE, cable_length, cable_spans
 
 
@@ -13,6 +14,9 @@ def length_of_line(line: Tendon, pose_of: Callable[[str], Frame]) -> float:
     Args:
         line: the tendon.
         pose_of: the pose of a link.
+
+    Raises:
+        FormatError: two points that follow each other lie in one place.
     """
 
     def place(link: str, frame: Frame) -> tuple[float, ...]:
@@ -22,10 +26,16 @@ def length_of_line(line: Tendon, pose_of: Callable[[str], Frame]) -> float:
     axes = [tuple((pose_of(d.link) @ d.at).A[:, 2].tolist()) for d in drums if d.cylinder]
     sides = [d.side or (d.link, d.at.r) for d in drums]
     ways = tuple(INSIDE if d.inside else PAST_SIDE * (d.side is not None) for d in drums)
+    points = [place(link, Frame(at)) for link, at in line.points]
+    divisors = line.divisors or (1.0,) * len(points)
+    ends = zip(points[:-1], points[1:], divisors[: len(points) - 1], strict=True)
+    if any(by and one == other for one, other, by in ends):
+        what = f"tendon {line.name}: two points that follow each other lie in one place"
+        raise FormatError(what, line.place, "they have no direction; move one, or leave it out")
     path = cable_spans(
-        [place(link, Frame(at)) for link, at in line.points],
+        points,
         [place(d.link, d.at) for d in drums], [d.radius for d in drums], axes,
         [place(link, Frame(at)) for link, at in sides], tuple(float(d.after) for d in drums), ways,
-        line.divisors or (1.0,) * len(line.points),
+        divisors,
     )  # fmt: skip
     return float(cable_length(path))

@@ -428,7 +428,8 @@ static int let_touch(dap3d_model *m, const double *crossing, int starts)
     double *y = numbers(m, CONTACT_Y), rates[STATES], t = real_of(m)[R_t];
     for (int c = 0; c < CONTACTS; c++)
         numbers(m, CONTACT_LIMIT)[c] =
-            (starts ? TOUCHING_AT_START : TOUCHING) * numbers(m, CONTACT_LENGTH)[c];
+            (starts ? TOUCHING_AT_START : TOUCHING) * numbers(m, CONTACT_LENGTH)[c] /
+            numbers(m, CONTACT_ARM)[c];
     for (int k = 0; k < 2 * CONTACTS; k++)
         m->w[CONTACT_ENDED + k] = crossing != NULL && crossing[m->w[CONTACT_SWITCHES + k]] != 0.0;
     m->w[CONTACT_INTEGER + CI_starts] = starts;
@@ -447,9 +448,10 @@ static int let_touch(dap3d_model *m, const double *crossing, int starts)
 static int are_endless(dap3d_model *m)
 {
     double t = real_of(m)[R_t], span = fmax(m->span, fabs(t));
+    int rattles = m->w[CONTACT_INTEGER + CI_freed] > MOST_JAMS;
     m->latest[m->change_count++ % MOST_CHANGES] = t;
     if (m->change_count < MOST_CHANGES
-        || t - m->latest[m->change_count % MOST_CHANGES] > WITHIN * span)
+        || t - m->latest[m->change_count % MOST_CHANGES] > (rattles ? RATTLING : WITHIN) * span)
         return 0;
     m->failure = ENDLESS;
     return 1;

@@ -58,6 +58,11 @@ class CollisionShapes:
     mu_spin: "Floats" = attrs.field(factory=_no_pairs)
 
     @property
+    def resists_turning(self) -> bool:
+        """True if some pairs resist rolling or spinning."""
+        return self.mu_roll.size + self.mu_spin.size > 0
+
+    @property
     def reach(self) -> "Floats":
         """(m,) radius of a ball about the centre of each that holds it, m; planes have none."""
         from numpy import hypot, linalg, select

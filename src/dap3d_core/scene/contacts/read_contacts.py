@@ -14,6 +14,7 @@ import numpy as np
 
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.contacts.contact import HIDDEN, LAWS, MATERIAL, SMOOTH, TOUCHES
+from dap3d_core.interface.contacts.resistance import RESISTED, resisting_type
 from dap3d_core.interface.examine.examine import examine
 from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.interface.formats.frames import from_quaternion
@@ -279,6 +280,25 @@ def read_contacts(
                 what = f"is less than mu = {values['mu']:g}; what slides would stick more than rest"
                 report.add(("contacts", one.name, "mu_s"), values["mu_s"], what)
             found.append(attrs.evolve(one, name=name, values=values))
+    return [*found, *_resisting(report, found)]
+
+
+def _resisting(report: Collector, contacts: Sequence[Instance]) -> list[Instance]:
+    """What resists rolling and spinning at contacts, as contacts of their own behind them."""
+    found = []
+    for one in contacts:
+        type_: Any = one.type_info.type
+        for how, (field, what) in RESISTED.items():
+            if not one.values.get(field) and type_.resist is None:
+                continue
+            name, _, point = one.name.partition("#")
+            if f"{name}_{how}" in report.scene.contacts.keys() | report.scene.joints.keys():
+                words = f"is the name of what resists {what} at {name}"
+                report.add(("contacts", f"{name}_{how}"), MISSING, words, remedy="rename it")
+            values = one.values | SMOOTH | {"e": 0.0, "mode_0": 0.0, "joint": one.name}
+            name = f"{name}_{how}#{point}" if point else f"{name}_{how}"
+            type_info = _examined(resisting_type(type_, how))
+            found.append(attrs.evolve(one, name=name, type_info=type_info, values=values))
     return found
 
 

@@ -149,10 +149,13 @@ class Statics:
     def stiffness(self, pose: StaticPose) -> Floats:
         """(f, f) Z^T K Z with K = -d(F + D^T lambda)/dx, the stiffness of reactions included.
 
+        States that keep the way of a motion stay as they are, as they do in ``force``.
+
         Raises:
             SimulationError: forces or rows have no derivative there.
         """
-        return self.reduced(self.tangent(pose).stiffness, pose)
+        tangent = with_settled(self.fixed_tangent(pose), self.evaluator, keeps_way=False)
+        return self.reduced(tangent.stiffness, pose)
 
     def tangent(self, pose: StaticPose) -> TangentMatrices:
         """The equations of motion and their derivatives at a pose, at rest, states settled.
@@ -160,11 +163,7 @@ class Statics:
         Raises:
             SimulationError: forces or rows have no derivative there.
         """
-        fixed = self.fixed_tangent(pose)
-        if fixed.states is None:
-            return fixed
-
-        return with_settled(fixed, self.evaluator)
+        return with_settled(self.fixed_tangent(pose), self.evaluator)
 
     def _settle(self, u: Floats) -> None:
         """Let the states of elements come to rest at a pose."""
@@ -306,13 +305,17 @@ def _kept_way(own: StateDerivatives, inverse: Any) -> Any:
     return by_motion - own.rate_by_states @ (inverse @ by_motion)
 
 
-def with_settled(tangent: "TangentMatrices", evaluator: Evaluator) -> "TangentMatrices":
-    """A tangent with the stiffness of states: settled, or such that keep the way of a motion."""
+def with_settled(
+    tangent: "TangentMatrices", evaluator: Evaluator, *, keeps_way: bool = True
+) -> "TangentMatrices":
+    """A tangent with the stiffness of states: settled, and such that keep the way of a motion."""
     own = tangent.states
     if own is None:
         return tangent
     inverse = _inverse(evaluator, own.rate_by_states)
-    follows = inverse @ own.rate_by_displacement - _kept_way(own, inverse)
+    follows = inverse @ own.rate_by_displacement
+    if keeps_way:
+        follows = follows - _kept_way(own, inverse)
     return attrs.evolve(tangent, stiffness=tangent.stiffness + own.force_by_states @ follows)
 
 

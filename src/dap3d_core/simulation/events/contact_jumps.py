@@ -31,6 +31,8 @@ from dap3d_core.simulation.events.jumps import LOSSLESS, MOST_RECORDS, Jumps, ro
 TOUCHING, TOUCHING_AT_START = 1e-10, 1e-8
 #: Ends of modes within this part of the run: what changes more often comes to no end.
 MOST_CHANGES, WITHIN = 2000, 1e-4
+#: Jams that impulses ended, after which as many changes within this part come to none either.
+MOST_JAMS, RATTLING = 500, 1e-2
 #: So many steps within this part of the run are too many: it would not come to an end.
 MOST_STEPS, SLOW = 10_000, 1e-5
 #: Records of changes from one mode to another.
@@ -171,14 +173,22 @@ class ContactJumps(Jumps):
         """SimulationError where changes of contacts follow each other ever faster."""
         latest, t = self._latest, integration.t
         latest.append((t, ", ".join(names)))
-        passed = t - latest[0][0]
-        if len(latest) < MOST_CHANGES or passed > WITHIN * self._span_of(integration):
+        passed, jams = t - latest[0][0], self.arrays.freed
+        within = RATTLING if jams > MOST_JAMS else WITHIN
+        if len(latest) < MOST_CHANGES or passed > within * self._span_of(integration):
             return
         every = sorted({name for _, some in latest for name in some.split(", ")})
+        start = f"the run stopped at t = {t:.9g} s: contacts {', '.join(every)}"
+        if jams > MOST_JAMS:
+            raise SimulationError(
+                f"{start} rattle: slip jams again and again, {jams} times by now, and each time an "
+                f"impulse ends it and lifts what falls back at once, {MOST_CHANGES} changes within "
+                f"{passed:.2g} s. Smaller mu of these contacts ends that"
+            )
         raise SimulationError(
-            f"the run stopped at t = {t:.9g} s: contacts {', '.join(every)} changed "
-            f"{MOST_CHANGES} times within {passed:.2g} s, ever faster. Smaller e of these contacts "
-            "ends bounces sooner (e = 0: at once); or end the run by an event before"
+            f"{start} changed {MOST_CHANGES} times within {passed:.2g} s, ever faster. Smaller e "
+            "of these contacts ends bounces sooner (e = 0: at once); or end the run by an event "
+            "before"
         )
 
     def notes(self, integration: Integration) -> list[str]:
@@ -281,7 +291,7 @@ class ContactJumps(Jumps):
             self._note(c, t + float(s.rest_time[c]), "rest")
         for c in np.flatnonzero(s.was != s.mode).tolist():
             kind = CHANGES.get((int(s.was[c]), int(s.mode[c])), "")
-            if kind and (s.was[c] or not table.alone[c]):
+            if kind and ((s.was[c] and s.mode[c]) or not table.alone[c]):
                 self._note(c, t, kind, u)
 
     def _refuse(self, t: float, failure: int) -> None:

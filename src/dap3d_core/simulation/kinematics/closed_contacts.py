@@ -62,6 +62,7 @@ class ContactForces:
         """Args: the evaluator of the model, in which all contacts are open."""
         self.table = ContactTable(evaluator)
         self._arrays = self.table.arrays()
+        self._arrays.arm[:] = 1.0  # its rows are those of the model
         self.outside: tuple[float, float, str] | None = None
 
     def at(self, t: float, u: Floats) -> Closed:

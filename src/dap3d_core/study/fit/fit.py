@@ -17,15 +17,16 @@ from dap3d_core.simulation import SimulationError
 from dap3d_core.study.ensemble import Ensemble
 from dap3d_core.study.fit.fit_parameters import Parameter, read_parameters
 from dap3d_core.study.fit.fit_result import Fit
-from dap3d_core.study.fit.identifiability import (
+from dap3d_core.study.fit.interpolation import MAX_INSTANTS, SeriesInterpolator, common_step
+from dap3d_core.study.fit.jacobian import (
+    Differences,
     NoiseFloor,
+    Predictor,
     correlation_of,
     identify,
     intervals,
     regularised,
 )
-from dap3d_core.study.fit.interpolation import MAX_INSTANTS, SeriesInterpolator, common_step
-from dap3d_core.study.fit.jacobian import Differences, Predictor
 from dap3d_core.study.outputs import Output
 from dap3d_core.study.parameters import with_values
 from dap3d_core.study.study import Study

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.ended import leave, shorten_chunks
 from support.plain import long_in_plain_python
-from support.results import same_bits
+from support.results import same_run
 
 import dap3d_core as dap
 from dap3d_core.simulation.events import contact_jumps
@@ -103,7 +103,7 @@ def test_a_run_goes_on_from_a_checkpoint_with_the_same_bits(tmp_path, monkeypatc
     settings = {"t_end": 1.0, "dt": 0.01, "integrator": "dop853"}
     whole = dap.simulate(bouncing(), **settings)
     again = dap.resume(leave(bouncing(), tmp_path, 0.3, **settings))
-    assert same_bits(again, whole)
+    assert same_run(again, whole)
     assert [(e.kind, e.t) for e in again.events] == [(e.kind, e.t) for e in whole.events]
 
 

@@ -8,7 +8,7 @@ from support.internals import off_constraints, write_program
 from support.plain import long_in_plain_python
 
 import dap3d_core as dap
-from dap3d_core.formulations.programs.operations import operations
+from dap3d_core.cli.commands.describe_model import operations
 
 pytestmark = long_in_plain_python
 

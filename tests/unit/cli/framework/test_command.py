@@ -10,7 +10,7 @@ import time
 import pytest
 from support.internals import Terminated
 
-from dap3d_core.cli.process.signals import SignalHandler
+from dap3d_core.cli.framework.command import SignalHandler
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals as POSIX has them")
 each = pytest.mark.parametrize(

@@ -1,0 +1,57 @@
+"""Parts of MJCF files that belong to each other: options, replicas and tendons, muscles."""
+
+import pytest
+
+import dap3d_core as dap
+
+
+def imported(path, text):
+    path.write_text(f"<mujoco>{text}</mujoco>")
+    return dap.import_model(path)
+
+
+def test_a_later_option_keeps_gravity(tmp_path):
+    body = '<worldbody><body><freejoint/><geom size="0.1"/></body></worldbody>'
+    text = f'<option gravity="0 0 -1.6"/><option cone="elliptic"/>{body}'
+    scene, _ = imported(tmp_path / "a.xml", text)
+    assert scene.forces["gravity"].fields["gravity"] == 1.6
+
+
+BALLS = """<worldbody><site name="top" pos="0 0 2"/><site name="low" pos="0 0 1"/><replicate count="3" offset="1 0 0">
+<body name="ball"><joint name="x" type="slide" axis="1 0 0"/><geom size="0.1"/>
+<site name="end"/></body></replicate></worldbody>
+<tendon><spatial name="rope" stiffness="3"><site site="top"/><site site="end"/></spatial>
+<spatial name="own" stiffness="1"><site site="top"/><site site="low"/></spatial></tendon>
+<actuator><motor joint="x" name="pull"/><motor tendon="rope" name="wind"/></actuator>"""
+
+
+def test_what_names_a_replica_is_copied_with_it(tmp_path):
+    """Tendons to each ball, motors of these and of the joints; what is apart stays one."""
+    scene, _ = imported(tmp_path / "a.xml", BALLS)
+    assert set(scene.inputs) == {f"{name}{k}" for name in ("pull", "wind") for k in range(3)}
+    names = [n for n, f in scene.forces.items() if f.type == "ptp" and f.fields.get("k") == 3.0]
+    assert names == [f"rope{k}_spring" for k in range(3)]
+
+
+def test_copies_of_tendons_have_a_bound(tmp_path):
+    text = BALLS.replace('"3"', '"15000"')
+    with pytest.raises(dap.SceneError, match="more than 100000"):
+        imported(tmp_path / "a.xml", text)
+
+
+def test_force_of_a_muscle_by_its_acceleration(tmp_path):
+    """scale over the acceleration by a force of 1: 2 * 0.1 / 0.5 rad/s^2; its gear is 2."""
+    text = """<worldbody><body><joint name="q" axis="0 1 0" armature="0.2"/>
+      <inertial pos="0 0 0" mass="1" diaginertia="0.3 0.3 0.3"/></body></worldbody>
+      <tendon><fixed name="t"><joint joint="q" coef="0.1"/></fixed></tendon>
+      <actuator><muscle tendon="t" gear="2" scale="50" lengthrange="-1 1"/></actuator>"""
+    scene, report = imported(tmp_path / "a.xml", text)
+    assert not [one for one in report.left_out if one.motion]
+    (peak,) = [f.fields["peak"] for f in scene.forces.values() if "peak" in f.fields]
+    assert peak == pytest.approx(2.0 * 50.0 / 0.4, rel=1e-12)
+
+
+def test_points_of_a_tendon_in_one_place_are_refused(tmp_path):
+    text = BALLS.replace('pos="0 0 1"', 'pos="0 0 2"')
+    with pytest.raises(dap.SceneError, match="tendon own: two points that follow each other"):
+        imported(tmp_path / "a.xml", text)
