@@ -180,7 +180,7 @@ def grid_pairs(s: PlacedShapes, bodies: int) -> None:
 
 @compiled
 def has_formula(a: int, b: int) -> bool:
-    """True if pairs of two kinds, a >= b, are those of ``touch``, not of ``touch_convex``."""
+    """True if pairs of two kinds, a >= b, need no ``touch_convex``."""
     if a >= ELLIPSOID:
         return False
     return b < CAPSULE or a < CYLINDER or (b == CAPSULE and a == BOX) or b > CYLINDER
@@ -209,6 +209,9 @@ class Touches:
 def touch(s: PlacedShapes, i: int, j: int, count: int) -> int:
     """Append points of shapes i and j nearer than the sum of what is near; the new count."""
     which, found, centre, axes, size = s.which, s.found, s.centre, s.axes, s.size
+    if not has_formula(s.kind[i], s.kind[j]):
+        return touch_convex(i, j, s.kind, centre, axes, size, s.corners, s.vertices, s.near,
+                            s.work, which, found, count)  # fmt: skip
     q, n, a, b, most = s.scratch[CORNERS], s.scratch[CORNERS + 1], s.kind[i], s.kind[j], 0.0
     most, c, d = s.near[i] + s.near[j], centre[i], centre[j]
     if b == PLANE:
@@ -249,14 +252,8 @@ def find_touches(s: PlacedShapes, poses: Floats, margin: Floats) -> bool:
             i, j = s.pairs[k, 0], s.pairs[k, 1]
             if s.kind[i] < s.kind[j] or (s.kind[i] == s.kind[j] and i > j):
                 i, j = j, i
-            by_formula = has_formula(s.kind[i], s.kind[j])
-            if by_formula != (turn == 0):
-                continue
-            if by_formula:
+            if has_formula(s.kind[i], s.kind[j]) == (turn == 0):
                 count = touch(s, i, j, count)
-            else:
-                count = touch_convex(i, j, s.kind, s.centre, s.axes, s.size, s.corners, s.vertices,
-                                     s.near, s.work, s.which, s.found, count)  # fmt: skip
     s.point_count = count
     return count <= s.found.shape[0]
 

@@ -35,6 +35,8 @@ SMALL_SIZE = 9
 #: Kinds of contacts: with a cone; friction of a joint, or of what rolls, along rows 1 and 2; of a
 #: joint along all three.
 CONE, ALONE, WHOLE = range(3)
+#: What a contact does in a step: it collides, and comes to a stop or bounces; or it stays closed.
+STOPS, BOUNCES, STAYS = 1, 2, 3
 #: Arrays of which a row belongs to a contact.
 OF_CONTACTS = ("bodies", "key", "kind", "under", "group", "chosen", "J", "moved", "own",
                "own_held", "gap", "mu", "rim", "e", "bias", "r", "left", "collides", "closing",
@@ -74,7 +76,7 @@ class StepArrays(Arrays):
              "B", "B_factored", "push",
              "kept", "met", "D", "declared_x", "log",
              "felt", "answer", "missing", "bounce", "v_bounce", "x_bounce",
-             "carried"),
+             "carried", "bias"),
             MATRIX,
         ),
         "shapes": PlacedShapes.type_of(),
@@ -84,7 +86,7 @@ class StepArrays(Arrays):
     contact_count = _integer()
     touch_count = _integer()  # the first ones, of shapes
     law_count = _integer()  # with those declared; behind them what resists their rolling
-    stage = _integer()  # of a step that waits for room: 0, or FREE or MOVED (step.py)
+    stage = _integer()  # of a step that waits for room: 0, or FREE, MOVED or START (step.py)
     is_solved = _integer()  # 1: there were contacts in the last step
     met_count = _integer()
     log_count = _integer()
@@ -154,7 +156,7 @@ class StepArrays(Arrays):
     under: Integers  # the contact whose rolling it resists, or -1
     group: Integers  # the least body of those that contacts connect
     chosen: Integers  # contacts of a group
-    collides: Integers  # what it does; the part of the step at which it closes
+    collides: Integers  # STOPS, BOUNCES, STAYS or 0; the part of the step at which it closes
     closing: Floats
     J: Floats  # (c, 36) rows of the velocity of body i less that of j: normal, tangents
     moved: Floats  # the same times M^-1
@@ -164,7 +166,7 @@ class StepArrays(Arrays):
     mu: Floats  # of the cone
     rim: Floats  # friction besides, N s
     e: Floats
-    bias: Floats  # m/s, added to normal velocities
+    bias: Floats  # (c, 3) m/s, added to velocities
     r: Floats  # masses that rows feel, kg
     left: Floats  # residuals
     x: Floats  # (c, 3) impulses, N s; what is projected, its slopes, impulses tried, others kept
@@ -317,7 +319,7 @@ def _of_contacts(room: int) -> dict[str, Any]:
     """Arrays of so many contacts."""
     widths = {"bodies": 2, "J": 36, "moved": 36, "met": MET,
               **dict.fromkeys(("own", "own_held", "B", "B_factored"), 9),
-              **dict.fromkeys(("x", "u", "z", "push", "kept", "missing", "x_bounce"),
+              **dict.fromkeys(("x", "u", "z", "bias", "push", "kept", "missing", "x_bounce"),
                               3)}  # fmt: skip
     whole = ("bodies", "key", "kind", "under", "group", "chosen", "collides")
     return {

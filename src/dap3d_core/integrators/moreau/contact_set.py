@@ -7,7 +7,8 @@ import math
 from typing import Any
 
 from dap3d_core.assembly.arrays import ACCELERATION, POSITION, System
-from dap3d_core.assembly.collisions.find import find_touches
+from dap3d_core.assembly.collisions.find import find_touches, touch
+from dap3d_core.assembly.collisions.placed_shapes import place_shapes
 from dap3d_core.assembly.evaluate import call_kinds, place
 from dap3d_core.formulations.contacts.equations import (
     BODY_I,
@@ -18,7 +19,8 @@ from dap3d_core.formulations.contacts.equations import (
     STATE,
     UNDER,
 )
-from dap3d_core.integrators.moreau.arrays import ALONE, CONE, StepArrays
+from dap3d_core.integrators.moreau.arrays import ALONE, CONE, STAYS, StepArrays
+from dap3d_core.integrators.stepping.vector_ops import copy
 from dap3d_core.interface.contacts.rows import FAR_APART, SLIDES, STEPPED
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.array_struct import pointer
@@ -30,6 +32,8 @@ ROLLS, SPINS, DECLARED = 2**50, 2**51, 2**52
 POINTS = 256
 #: The least ratio of an ellipse of friction.
 THIN = 1e-9
+#: What slides by more than its slip changes by within a step, times this, does not come to rest.
+SLIDES_ON = 0.5
 #: Of the states of a contact after its mode and way, what is nearest.
 NEAREST = 4
 
@@ -41,7 +45,7 @@ def find_contacts(
     """Find the contacts at an integrated state y; False without room.
 
     Shapes are nearer than the margins of bodies, declared contacts than ``most``; friction of
-    joints, and of what rolls, is among them where that is FAR_APART.
+    joints is among them where that is FAR_APART.
     """
     place_poses(y, s)
     s.contact_count = s.touch_count = 0
@@ -69,10 +73,90 @@ def find_contacts(
             if near:
                 put_declared(k, s, system)
     s.law_count = s.contact_count
-    if s.resistance_count > 0 and most >= FAR_APART:
-        for c in range(s.touch_count):
-            put_resistances(c, s)
     return True
+
+
+@compiled
+def turn_rows(t: float, y: Floats, s: StepArrays, system: System, loops: Any) -> bool:
+    """Take rows of what stays closed, and of joints, halfway through the step; False without room.
+
+    Args:
+        t, y: time and integrated state there.
+        s: ``end`` has the velocities expected at the end of the step.
+    """
+    shapes, first = s.shapes, s.touch_count
+    if s.declared_gap.size + s.y.size > 0:
+        evaluate_rows(t, y, s, system, loops)
+    place_poses(y, s)
+    if first > 0:
+        place_shapes(shapes, s.poses, s.margin)
+    last = first
+    for c in range(s.law_count):
+        for k in range(36):
+            s.moved[c, k] = s.J[c, k]
+        if c >= first:
+            if s.kind[c] != CONE or s.collides[c] == STAYS:
+                put_rows(c, s, system)
+        elif s.collides[c] == STAYS:
+            i, j = shapes.which[c, 0], shapes.which[c, 1]
+            if last == first or shapes.which[first, 0] != i or shapes.which[first, 1] != j:
+                last = touch(shapes, i, j, first)
+                if last > shapes.found.shape[0]:
+                    shapes.point_count = last
+                    return False
+            for q in range(first, last):
+                if shapes.which[q, 2] == shapes.which[c, 2]:
+                    turn_touch(c, shapes.found[q], s)
+        if s.collides[c] == STAYS:
+            put_turned_bias(c, s)
+    return True
+
+
+@compiled
+def turn_touch(c: int, found: Floats, s: StepArrays) -> None:
+    """Take the rows of contact c from what is found later, but for a point that leaps."""
+    here, gap, far = s.shapes.found[c], s.gap[c], 0.0
+    for k in range(3):
+        far += (found[k] - here[k]) * (found[k] - here[k])
+    if far <= (s.margin[s.bodies[c, 0]] + s.margin[s.bodies[c, 1]]) ** 2:
+        copy(here, found)
+        put_touch(c, s)
+        s.gap[c] = gap
+
+
+@compiled
+def put_turned_bias(c: int, s: StepArrays) -> None:
+    """Put what velocities change by as rows turn, from those in ``moved``, by J in half a step.
+
+    Rows at the end of the step are to close it, or to stick. What slides throughout has friction
+    along its slip halfway.
+    """
+    J, old, bias, slip, more = s.J[c], s.moved[c], s.bias[c], s.u[c], s.turned
+    a, b, side, sign = s.end[s.bodies[c, 0]], s.end[s.bodies[c, 1]], 0, 1.0
+    if s.bodies[c, 0] == 0:
+        side, sign = 6, -1.0
+    slip[0], slip[1], slip[2] = velocity_of(s, c, s.before)
+    for k in range(3):
+        more[k] = 0.0
+    size = change = 0.0
+    for r in range(3):
+        u, was = 0.0, 0.0
+        for k in range(6):
+            u += J[12 * r + k] * a[k] + J[12 * r + 6 + k] * b[k]
+            was += old[12 * r + k] * a[k] + old[12 * r + 6 + k] * b[k]
+        for k in range(3):
+            more[k] += sign * (J[12 * r + side + k] * u - old[12 * r + side + k] * was)
+        if r == 0:
+            bias[0] += u - was
+        else:
+            size += slip[r] * slip[r]
+            slip[r] = u - slip[r]
+            change += slip[r] * slip[r]
+    for r in range(1, 3):
+        bias[r] = -0.5 * slip[r]
+        if change > SLIDES_ON * SLIDES_ON * size:
+            e = J[12 * r + side :]
+            bias[r] = sign * (e[0] * more[0] + e[1] * more[1] + e[2] * more[2])
 
 
 @compiled
@@ -158,7 +242,8 @@ def put_resistance(c: int, key: int, s: StepArrays) -> None:
     s.contact_count = d + 1
     s.bodies[d, 0], s.bodies[d, 1] = s.bodies[c, 0], s.bodies[c, 1]
     s.key[d], s.kind[d], s.under[d] = key + s.key[c], ALONE, c
-    s.gap[d] = s.mu[d] = s.e[d] = 0.0
+    s.gap[d] = s.mu[d] = s.e[d] = s.bias[d, 0] = s.bias[d, 1] = s.bias[d, 2] = 0.0
+    s.collides[d] = 0
     for k in range(36):
         s.J[d, k] = 0.0
 
@@ -284,6 +369,15 @@ def velocity_of(s: StepArrays, c: int, v: Floats) -> tuple[float, float, float]:
 
 
 @compiled
+def put_speeds(s: StepArrays, c: int, v: Floats) -> None:
+    """Put the velocities of contact c with their bias, ``u``."""
+    u, bias = s.u[c], s.bias[c]
+    u[0], u[1], u[2] = velocity_of(s, c, v)
+    for k in range(3):
+        u[k] += bias[k]
+
+
+@compiled
 def put_declared(k: int, s: StepArrays, system: System) -> None:
     """Make a contact of one that is declared."""
     c = s.contact_count
@@ -295,6 +389,13 @@ def put_declared(k: int, s: StepArrays, system: System) -> None:
     s.mu[c], s.e[c], s.ratio[k] = 0.0, s.declared_e[k], 1.0
     if s.kind[c] == CONE:
         s.gap[c], s.mu[c] = system.residual[s.declared_gap[k]], s.declared_mu[k]
+    put_rows(c, s, system)
+
+
+@compiled
+def put_rows(c: int, s: StepArrays, system: System) -> None:
+    """Put the rows of a declared contact as they are evaluated."""
+    k = s.key[c] - DECLARED
     for side in range(6):
         first = s.declared_place[k, side]
         for i in range(6):

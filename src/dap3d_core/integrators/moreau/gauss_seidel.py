@@ -27,7 +27,7 @@ def sweep_bodies(
         bodies: (m, 2) i and j, ground 0.
         J, moved: (m, 36) rows normal, tangents, each of bodies i and j; the same times M^-1.
         own: (m, 9) J moved^T of each contact.
-        bias: (m,) m/s, added to the normal velocity.
+        bias: (m, 3) m/s, added to velocities.
         kind: (m,) CONE, ALONE or WHOLE.
         under: (m,) contact before, whose push is the most friction of one, or -1.
         mu, rim: (m,) friction is at most mu times what pushes, and ``rim``, N s.
@@ -40,7 +40,7 @@ def sweep_bodies(
         for c in range(mu.size):
             i, j = bodies[c, 0], bodies[c, 1]
             a, b, rows, moves = v[i], v[j], J[c], moved[c]
-            u0, u1, u2 = bias[c], 0.0, 0.0
+            u0, u1, u2 = bias[c, 0], bias[c, 1], bias[c, 2]
             for k in range(6):
                 u0 += rows[k] * a[k] + rows[6 + k] * b[k]
                 u1 += rows[12 + k] * a[k] + rows[18 + k] * b[k]

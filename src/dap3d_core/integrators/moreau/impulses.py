@@ -34,14 +34,9 @@ def slot_of(memory: Any, slots: Integers, key: int) -> int:
 
 
 @compiled
-def recall(work: Any, s: StepArrays) -> None:
-    """Take the impulses of the last step in the frames of the contacts, zero of new ones.
-
-    Of those of joints a part.
-
-    Those that are declared stick or slide as they did, new ones by their slip.
-    """
-    memory, slots, count = work.memory, s.slots, 0
+def order_memory(memory: Floats, slots: Integers) -> None:
+    """Put the places of keys in the memory of the last step into its table."""
+    count = 0
     for k in range(slots.size):
         slots[k] = -1
     while count < memory.shape[0] and memory[count, 0] >= 0.0:
@@ -49,6 +44,17 @@ def recall(work: Any, s: StepArrays) -> None:
         if slots[at] < 0:
             slots[at] = count
         count += 1
+
+
+@compiled
+def recall(work: Any, s: StepArrays) -> None:
+    """Take the impulses of the last step in the frames of the contacts, zero of new ones.
+
+    Of those of joints a part.
+
+    Those that are declared stick or slide as they did, new ones by their slip.
+    """
+    memory, slots = work.memory, s.slots
     for k in range(s.y.size):
         s.y[k] = TRIED_PULL * work.pulls[k]
     for c in range(s.contact_count):
@@ -158,8 +164,8 @@ def keep_for_reports(s: StepArrays) -> None:
 
 @compiled
 def complete_row(work: Any, s: StepArrays, row: Floats) -> None:
-    """Put means of the last step, and modes of declared contacts, into a row of reports."""
-    if work.step_count == 0:
+    """Put means of the last step, at the start of the first one, into a row of reports."""
+    if work.step_count == 0 and s.is_solved == 0:
         return
     for b in range(1, s.end.shape[0]):
         for k in range(6):
@@ -179,7 +185,7 @@ def complete_row(work: Any, s: StepArrays, row: Floats) -> None:
 @compiled
 def log_contacts(work: Any, s: StepArrays, t: float) -> None:
     """Log the contacts that shapes push with at a reported instant."""
-    for m in range(s.met_count if work.step_count > 0 else 0):
+    for m in range(s.met_count):
         log, met = s.log[s.log_count], s.met[m]
         log[0] = t
         for k in range(1, MET):

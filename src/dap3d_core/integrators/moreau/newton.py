@@ -17,7 +17,7 @@ not get over: they are taken back where rounds no longer help, and raised again 
 import math
 
 from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
-from dap3d_core.integrators.moreau.contact_set import DECLARED, velocity_of
+from dap3d_core.integrators.moreau.contact_set import DECLARED, put_speeds, velocity_of
 from dap3d_core.integrators.moreau.matrix import (
     assemble,
     factor,
@@ -188,9 +188,8 @@ def speed_of(s: StepArrays, k: int, v: Floats) -> float:
 @compiled
 def left_at(s: StepArrays, c: int, v: Floats) -> float:
     """What contact c misses the law by."""
+    put_speeds(s, c, v)
     u = s.u[c]
-    u[0], u[1], u[2] = velocity_of(s, c, v)
-    u[0] += s.bias[c]
     put_missed(s.x[c], u, bound_of(s, c, s.x, s.y), s.kind[c], s.r[c], u)
     return max(abs(u[0]), abs(u[1]), abs(u[2]))
 
@@ -230,9 +229,7 @@ def begin_round(s: StepArrays) -> None:
         for k in range(6):
             s.delta[s.used[q], k] = 0.0
     for q in range(s.chosen_count):
-        u = s.u[s.chosen[q]]
-        u[0], u[1], u[2] = velocity_of(s, s.chosen[q], s.v)
-        u[0] += s.bias[s.chosen[q]]
+        put_speeds(s, s.chosen[q], s.v)
     for k in range(s.y.size):
         s.lead[k] = speed_of(s, k, s.v) - speed_of(s, k, s.free)
 

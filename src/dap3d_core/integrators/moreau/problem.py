@@ -5,7 +5,7 @@
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators.moreau.arrays import CONE, StepArrays, step_arrays
-from dap3d_core.integrators.moreau.contact_set import velocity_of
+from dap3d_core.integrators.moreau.contact_set import put_speeds
 from dap3d_core.integrators.moreau.gauss_seidel import (
     copy_impulses,
     sweep_bodies,
@@ -130,8 +130,8 @@ def solve(s: StepArrays, tolerance: float) -> bool:
     """Find the impulses x, y and velocities v of contacts, u = J v + bias; False without room.
 
     Args:
-        s: with velocities ``free`` that fit the joints; ``bias`` is added to normal velocities,
-            which are not to become negative then; ``x``, ``y`` are tried first.
+        s: with velocities ``free`` that fit the joints; ``bias`` is added to velocities, of which
+            normal ones are not to become negative then; ``x``, ``y`` are tried first.
         tolerance: of the residual, a part of the largest impulse.
     """
     few, joined = s.contact_count <= FEW, s.y.size > 0
@@ -243,9 +243,7 @@ def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
             meet_joints(s)
         put_velocities(s, s.v)
         for c in range(m):
-            u = s.u[c]
-            u[0], u[1], u[2] = velocity_of(s, c, s.v)
-            u[0] += s.bias[c]
+            put_speeds(s, c, s.v)
             s.rim[c] = 0.0 if s.kind[c] == CONE else rim_of(s, c, s.x, s.y)
         sweep_contacts(s.felt, s.own_held, s.u, s.kind, s.under, s.mu[:m], s.rim, s.x, SWEEPS,
                        aim)  # fmt: skip

@@ -12,7 +12,7 @@ three unknowns a contact.
 import math
 
 from dap3d_core.integrators.moreau.arrays import ALONE, CONE, StepArrays
-from dap3d_core.integrators.moreau.contact_set import velocity_of
+from dap3d_core.integrators.moreau.contact_set import put_speeds, velocity_of
 from dap3d_core.integrators.moreau.matrix import (
     assemble,
     factor,
@@ -142,9 +142,7 @@ def reduced_round(s: StepArrays, weight: float, tolerance: float) -> float:
     """
     m = s.contact_count
     for c in range(m):
-        u = s.u[c]
-        u[0], u[1], u[2] = velocity_of(s, c, s.v)
-        u[0] += s.bias[c]
+        put_speeds(s, c, s.v)
     while not solve_reduced(s, weight, tolerance) and weight >= LEAST:
         weight *= LESS
     for k in range(s.y.size):

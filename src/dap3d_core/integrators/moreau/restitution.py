@@ -10,7 +10,7 @@ convex, and without a bounce nothing is gained.
 
 import math
 
-from dap3d_core.integrators.moreau.arrays import StepArrays
+from dap3d_core.integrators.moreau.arrays import BOUNCES, StepArrays
 from dap3d_core.integrators.moreau.contact_set import velocity_of
 from dap3d_core.integrators.moreau.gauss_seidel import copy_impulses
 from dap3d_core.integrators.moreau.matrix import find_groups, root_of
@@ -18,8 +18,6 @@ from dap3d_core.integrators.moreau.problem import solve
 from dap3d_core.integrators.stepping.vector_ops import copy
 from dap3d_core.kernels.runtime.cache import compiled
 
-#: What a contact that collides does.
-STOPS, BOUNCES = 1, 2
 #: Columns of ``bounce``: work of the impulses of a group with the bounce, half of it, and without;
 #: the sum of the magnitudes of its parts; how much of the bounce is kept.
 WITH, HALF, WITHOUT, EXCHANGED, KEPT = range(5)
@@ -39,7 +37,8 @@ def limit_bounces(s: StepArrays, tolerance: float) -> bool:
         copy(s.v_bounce[b], s.v[b])
     copy_impulses(s.x, s.y, s.x_bounce, s.y_bounce, s.contact_count)
     for c in range(s.contact_count):
-        s.bias[c] = 0.0 if s.collides[c] == BOUNCES else s.bias[c]
+        if s.collides[c] == BOUNCES:
+            s.bias[c, 0] = 0.0
     if not solve(s, tolerance):
         return False
     put_work(s, WITHOUT, 0.0)

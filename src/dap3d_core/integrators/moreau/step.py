@@ -7,27 +7,36 @@ import math
 from typing import Any
 
 from dap3d_core.assembly.arrays import System, coordinate_offset, velocity_offset
-from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
+from dap3d_core.integrators.moreau.arrays import BOUNCES, CONE, STAYS, STOPS, WHOLE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import (
     axes_of,
     evaluate_rows,
     find_contacts,
     find_grips,
+    put_resistances,
+    turn_rows,
     velocity_of,
 )
-from dap3d_core.integrators.moreau.free_motion import follow_states, largest_rate, move_freely
+from dap3d_core.integrators.moreau.free_motion import (
+    follow_states,
+    largest_rate,
+    move_freely,
+    normalise,
+)
 from dap3d_core.integrators.moreau.impulses import (
     complete_row,
     keep_for_reports,
     let_slip,
     log_contacts,
+    order_memory,
     recall,
     remember,
+    slot_of,
 )
 from dap3d_core.integrators.moreau.matrix import find_groups, root_of
 from dap3d_core.integrators.moreau.newton import product_of, speed_of
 from dap3d_core.integrators.moreau.problem import NEAR, prepare_problem, solve
-from dap3d_core.integrators.moreau.restitution import BOUNCES, STOPS, limit_bounces
+from dap3d_core.integrators.moreau.restitution import limit_bounces
 from dap3d_core.integrators.stepping.integration_state import (
     NO_ROOM,
     NOT_FINITE,
@@ -58,8 +67,8 @@ RENEWED, FOLLOWED, MOST_STEPS = 3, 2.0, 100
 #: Margin of contacts, as parts of the way of a step, and m of a scene of ordinary size.
 MARGIN, LEAST_MARGIN = 1.2, 1e-6
 #: Stages of a step that waits for room: the trial state is that without contacts; it is that where
-#: bodies have moved to, but may overlap.
-FREE, MOVED = 1, 2
+#: bodies have moved to, but may overlap; it is looked for what contacts push with at the start.
+FREE, MOVED, START = 1, 2, 3
 
 
 @compiled
@@ -71,6 +80,10 @@ def advance(
     Or room is missing: ``stage`` says so.
     """
     limit = work.rhs_count + budget
+    if is_at_start(work, s):
+        s.stage = 0 if push_at_start(work, s, functions[0], system, loops) else START
+        if s.stage == START:
+            return
     while s.stage != 0 or goes_on(work, s, functions, system, loops, limit):
         if s.stage == 0:
             if work.step_count % RENEWED == 0:
@@ -85,6 +98,8 @@ def advance(
         if s.stage == FREE:
             if not meet(work, s, system, loops):
                 break
+            if s.is_solved != 0:
+                go(work, s)
             s.stage = MOVED
         if s.is_solved != 0 and not part(work, s, system, loops):
             break
@@ -92,6 +107,25 @@ def advance(
         finish(work, s, functions, system, loops)
     if s.stage != 0 and s.is_exported != 0:
         work.t_stop, work.status, s.stage = s.t1, NO_ROOM, 0
+
+
+@compiled
+def is_at_start(work: Any, s: StepArrays) -> bool:
+    """True until it is known what contacts push with before the first step."""
+    begins, knows = work.step_count + work.next_report == 0, work.memory[0, 0] >= 0.0
+    return begins and (s.stage == START or (s.stage == 0 and not knows))
+
+
+@compiled
+def push_at_start(work: Any, s: StepArrays, rhs: Any, system: System, loops: Any) -> bool:
+    """Find what contacts push with in a first step that is not taken; False without room."""
+    if s.stage == 0:
+        work.rate = largest_rate(work, s, rhs, system, loops)
+        s.h = work.fixed_step
+        move_freely(work, s, rhs, system, loops)
+    if not all_finite(work.state[TRIAL]):
+        return True
+    return meet(work, s, system, loops)
 
 
 @compiled
@@ -131,7 +165,7 @@ def state_at(work: Any, t: float, y: Floats) -> None:
 
 @compiled
 def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
-    """Let contacts push, and move the bodies, as the trial state; False without room."""
+    """Find impulses of contacts, and velocities ``end`` behind them; False without room."""
     y, trial, n = work.state[Y], work.state[TRIAL], s.mass.size - 1
     take_velocities(y, n, s.before)
     take_velocities(trial, n, s.free)
@@ -158,6 +192,11 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     any_collides = put_bias(s)
     if s.declared_law.size > 0:
         find_grips(work.t, s, system, loops)
+    order_memory(work.memory, s.slots)
+    if stay_closed(work, s) and not turn_rows(work.t + 0.5 * s.h, put_middle(work, s), s, system, loops):
+        return False
+    for c in range(s.touch_count if s.resistance_count > 0 else 0):
+        put_resistances(c, s)
     recall(work, s)
     while True:
         prepare_problem(s)
@@ -174,7 +213,14 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     keep_for_reports(s)
     for b in range(n + 1):
         copy(s.end[b], s.v[b])
-    for b in range(1, n + 1):
+    return True
+
+
+@compiled
+def go(work: Any, s: StepArrays) -> None:
+    """Move the bodies by what contacts give them, as the trial state."""
+    y, trial = work.state[Y], work.state[TRIAL]
+    for b in range(1, s.end.shape[0]):
         c, d = coordinate_offset(b), s.trial[b]
         for k in range(7 if s.hit[b] != NOT_HIT else 0):  # from where it was
             trial[c + k] = y[c + k]
@@ -183,7 +229,6 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         move(trial, c, d[0], d[1], d[2], d[3], d[4], d[5])
     trial[trial.size - 1] += work_done(work, s)
     keep_pushed(work, s)
-    return True
 
 
 @compiled
@@ -255,9 +300,10 @@ def put_bias(s: StepArrays) -> bool:
         for k in range(3):
             fall = max(fall, abs(s.free[b, k] - s.before[b, k]))
     for c in range(s.contact_count):
-        s.collides[c], s.bias[c] = 0, 0.0
+        bias, s.collides[c] = s.bias[c], 0
+        bias[0] = bias[1] = bias[2] = 0.0
         if s.gap[c] > OVERLAP * s.length:  # redundant contacts would disagree by less
-            s.bias[c] = s.gap[c] / s.h
+            bias[0] = s.gap[c] / s.h
         if s.kind[c] != CONE:
             continue
         approach, _, _ = velocity_of(s, c, s.before)
@@ -269,8 +315,52 @@ def put_bias(s: StepArrays) -> bool:
             last = 1.0 - s.closing[c]
             back = last * (normal - approach) - s.e[c] * (normal - last * (normal - approach))
             if s.e[c] > 0.0 and back > 0.0:
-                s.collides[c], s.bias[c] = BOUNCES, -back
+                s.collides[c], bias[0] = BOUNCES, -back
     return found
+
+
+@compiled
+def stay_closed(work: Any, s: StepArrays) -> bool:
+    """Mark the contacts that stay closed and move, by velocities ``end`` expected; True if any."""
+    found, least = False, OVERLAP * s.length
+    for b in range(1, s.end.shape[0]):
+        for k in range(6):
+            s.end[b, k] = s.free[b, k] + s.h * work.pushed[b, k]
+    for c in range(s.law_count):
+        i, j = s.bodies[c, 0], s.bodies[c, 1]
+        way = s.h * (speed_at(s, i) + speed_at(s, j))
+        if s.kind[c] == CONE and s.collides[c] == 0 and way > least:
+            pushed = is_pushed(work, i) or is_pushed(work, j)
+            if pushed and s.slots[slot_of(work.memory, s.slots, s.key[c])] >= 0:
+                s.collides[c], found = STAYS, True
+    return found
+
+
+@compiled
+def is_pushed(work: Any, b: int) -> bool:
+    """True if contacts gave a body an acceleration in the last step."""
+    found = False
+    for k in range(6):
+        found |= work.pushed[b, k] != 0.0
+    return found and b > 0
+
+
+@compiled
+def speed_at(s: StepArrays, b: int) -> float:
+    """How fast a body moves, m/s, its turning at the length of the scene."""
+    return length_of(s.end[b], 0) + s.length * length_of(s.end[b], 3)
+
+
+@compiled
+def put_middle(work: Any, s: StepArrays) -> Floats:
+    """The state halfway to that expected at the end of the step."""
+    y, trial, size = work.state[Y], work.state[TRIAL], work.state.shape[1]
+    middle = s.slopes[:size]
+    for i in range(size):
+        middle[i] = 0.5 * (y[i] + trial[i])
+    for b in range(1, s.end.shape[0]):
+        normalise(middle, coordinate_offset(b) + 3)
+    return middle
 
 
 @compiled
@@ -380,8 +470,8 @@ def part(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
             for k in range(6):
                 s.free[b, k] = 0.0
         for c in range(s.contact_count):
-            s.bias[c], s.mu[c] = s.gap[c], 0.0
-            s.x[c, 0] = s.x[c, 1] = s.x[c, 2] = 0.0
+            s.bias[c, 0], s.mu[c] = s.gap[c], 0.0
+            s.x[c, 0] = s.x[c, 1] = s.x[c, 2] = s.bias[c, 1] = s.bias[c, 2] = 0.0
         for k in range(s.y.size):
             s.y[k] = 0.0
         if not solve(s, NEAR):
