@@ -2,29 +2,17 @@
 
 from typing import ClassVar
 
-from dap3d_core.interface import (
-    Body,
-    Force,
-    Point,
-    Vector,
-    angle,
-    body,
-    choice,
-    hookimpl,
-    joint_fields,
-    number,
-    point,
-    vector,
-)
+from dap3d_core.interface import Force, angle, choice, hookimpl, number
 from dap3d_core.kernels import dot, normals, sub, where
 from dap3d_forces.axial_spring import along, pull
 from dap3d_forces.bounds import bounds, within
 from dap3d_forces.torsion import pair
+from dap3d_joints.motor import CoordinateFields
 
 interface_version = 1
 
 
-class Actuator(Force):
+class Actuator(CoordinateFields, Force):
     """A moment or force in the coordinate q of a joint, as actuators of MJCF give it.
 
     With the control u, a number or the name of a function of time or of an input, kept within its
@@ -46,15 +34,7 @@ class Actuator(Force):
     keyword = "actuator"
     symbol = "ring"
     example: ClassVar[dict[str, str]] = {"control": "2.0"}
-    joint: str = joint_fields(
-        "body_i", "body_j", "P_i", "P_j", "a_j", facts=("coordinate",), doc="joint that it moves"
-    )
-    body_i: Body = body(default=None, doc="body that is moved; that of P_i")
-    body_j: Body = body(default=None, doc="body that holds it; that of P_j and a_j")
-    P_i: Point = point(default=None, doc="on body i; the mass centre when left out")
-    P_j: Point = point(default=None, doc="on body j; the mass centre when left out")
-    a_j: Vector = vector(doc="axis, on body j")
-    coordinate: str = choice(("angle", "length"), None, doc="the joint's when left out, else angle")
+
     control: float = number(by_name=("function", "input"), doc="u")
     gain: float = number(1.0, unit="N m or N", doc="force for a control of 1")
     bias: float = number(0.0, unit="N m or N", doc="force without control where q is zero")

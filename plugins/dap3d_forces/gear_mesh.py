@@ -1,30 +1,18 @@
 """Elastic mesh of two toothed wheels: stiffness, damping, backlash, pressure angle and helix."""
 
-from collections.abc import Mapping
 from math import cos, tan
-from typing import ClassVar
 
-from dap3d_core.interface import (
-    Force,
-    Point,
-    Vector,
-    choice,
-    hookimpl,
-    joint_fields,
-    number,
-    point,
-    vector,
-)
+from dap3d_core.interface import Force, hookimpl, number
 from dap3d_core.kernels import abs as magnitude
 from dap3d_core.kernels import add, atan2, cross, dot, floor, neg, scale, sign, sqrt, sub, where
-from dap3d_joints.gear import PRESSURE_ANGLE, meshing, pitch_of
+from dap3d_joints.gear import Wheels, meshing, pitch_of
 
 interface_version = 1
 
 TURN = 6.283185307179586
 
 
-class GearMesh(Force):
+class GearMesh(Wheels, Force):
     """Teeth of wheels i and j press on one another in the pitch point, and give way there.
 
     What the joint ``gear`` is for rigid teeth, with the same g, phi, radii and sense s. Along the
@@ -47,32 +35,9 @@ class GearMesh(Force):
 
     keyword = "gear"
     synonyms = ("mesh", "gearmesh")
-    example: ClassVar[Mapping[str, str]] = {
-        "P_i": '"crank.O"',
-        "P_j": '"rod.O"',
-        "a_i": '"crank.y"',
-        "a_j": '"rod.y"',
-        "teeth_i": "20",
-        "teeth_j": "40",
-    }
-    joint_i: str = joint_fields(P_i="P", a_i="a", doc="hinge of wheel i")
-    joint_j: str = joint_fields(P_j="P", a_j="a", doc="hinge of wheel j")
-    P_i: Point = point(default=None, doc="on the axis of wheel i; its mass centre when left out")
-    P_j: Point = point(default=None, doc="on the axis of wheel j; its mass centre when left out")
-    a_i: Vector = vector(doc="axis of wheel i, on the wheel")
-    a_j: Vector = vector(doc="axis of wheel j, on the wheel, or on ground for a fixed ring")
     k: float = number(unit="N/m", minimum=0.0, doc="stiffness of the teeth, along the tangent")
     c: float = number(0.0, unit="N s/m", minimum=0.0, doc="damping")
     backlash: float = number(0.0, unit="m", minimum=0.0, doc="play of the teeth, on the circle")
-    pressure_angle: float = number(PRESSURE_ANGLE, unit="rad", minimum=0.0, maximum=1.0,
-                                   doc="of the teeth, 20 deg by default")  # fmt: skip
-    helix: float = number(0.0, unit="rad", usual=(-0.8, 0.8), doc="helix angle of wheel i")
-    teeth_i: float = number(default=None, minimum=1.0, whole=True, doc="teeth of wheel i")
-    teeth_j: float = number(default=None, minimum=1.0, whole=True, doc="teeth of wheel j")
-    radius_i: float = number(default=None, unit="m", positive=True, doc="pitch radius of wheel i")
-    radius_j: float = number(default=None, unit="m", positive=True, doc="pitch radius of wheel j")
-    internal: bool = choice((False, True), False, doc="one wheel is a ring with teeth inside")
-    bevel: bool = choice((False, True), False, doc="the axes meet")
 
     def prepare(self, bodies):
         sizes = meshing(self, bodies)

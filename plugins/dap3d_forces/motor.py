@@ -3,23 +3,11 @@
 from collections.abc import Mapping
 from typing import ClassVar
 
-from dap3d_core.interface import (
-    Body,
-    Force,
-    Point,
-    Vector,
-    angle,
-    body,
-    choice,
-    hookimpl,
-    joint_fields,
-    number,
-    point,
-    vector,
-)
+from dap3d_core.interface import Force, angle, hookimpl, number
 from dap3d_core.kernels import dot, normals, sub, tanh, where
 from dap3d_forces.axial_spring import along, pull
 from dap3d_forces.torsion import pair
+from dap3d_joints.motor import CoordinateFields
 
 interface_version = 1
 
@@ -27,7 +15,7 @@ interface_version = 1
 UNLIMITED = 1e100
 
 
-class Motor(Force):
+class Motor(CoordinateFields, Force):
     """A moment or force in the coordinate of a joint, given, or as a speed or position takes it.
 
     ``torque`` and ``force`` are a number, or the name of a function of time or of an input. With a
@@ -61,15 +49,7 @@ class Motor(Force):
     synonyms = ("rotational-motor",)
     symbol = "ring"
     example: ClassVar[Mapping[str, str]] = {"torque": "2.0"}
-    joint: str = joint_fields(
-        "body_i", "body_j", "P_i", "P_j", "a_j", facts=("coordinate",), doc="joint that it moves"
-    )
-    body_i: Body = body(default=None, doc="body that is moved; that of P_i")
-    body_j: Body = body(default=None, doc="body that holds the motor; that of P_j and a_j")
-    P_i: Point = point(default=None, doc="on body i; the mass centre when left out")
-    P_j: Point = point(default=None, doc="on body j; the mass centre when left out")
-    a_j: Vector = vector(doc="axis, on body j")
-    coordinate: str = choice(("angle", "length"), None, doc="the joint's when left out, else angle")
+
     torque: float = number(
         default=None, unit="N m", by_name=("function", "input"), doc="moment on body i about a_j"
     )

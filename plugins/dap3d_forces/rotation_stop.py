@@ -3,29 +3,17 @@
 from collections.abc import Mapping
 from typing import ClassVar
 
-from dap3d_core.interface import (
-    Body,
-    Contact,
-    Force,
-    Vector,
-    angle,
-    body,
-    choice,
-    hookimpl,
-    joint_fields,
-    number,
-    vector,
-)
+from dap3d_core.interface import Contact, Force, angle, choice, hookimpl, number
 from dap3d_core.kernels import dot, neg, rotate, scale, where
 from dap3d_forces.rebound import carried, rebound, reduced, stored
-from dap3d_forces.torsion import marks
+from dap3d_forces.torsion import AngleFields, marks
 
 interface_version = 1
 
 ZERO = (0.0, 0.0, 0.0)
 
 
-class RotationStop(Force):
+class RotationStop(AngleFields, Force):
     """Limit of the angle theta of body j relative to body i about an axis u common to both.
 
     theta falls where the angle that a rev or cyl about u of the same bodies i and j reports grows:
@@ -46,14 +34,7 @@ class RotationStop(Force):
     unilateral = (0,)
     restitution = "e"
     energy_where = "where the bodies turn about the common axis"
-    joint: str = joint_fields(
-        "body_i", "body_j", axis="a_j", acts_in="angle", doc="the hinge that it stops"
-    )
-    body_i: Body = body(default=None, doc="body i; that of v_i")
-    body_j: Body = body(default=None, doc="body j; that of v_j")
-    v_i: Vector = vector(None, across="axis", doc="direction it is measured from, on body i")
-    v_j: Vector = vector(None, across="axis", doc="direction it is measured to, on body j")
-    axis: Vector = vector(doc="common axis, on either body")
+
     theta: float = angle("v_i", "v_j", "axis")
     theta_stop: float = number(unit="rad", doc="least or greatest angle")
     side: str = choice(("min", "max"), default="min", doc="whether it is the least or the greatest")

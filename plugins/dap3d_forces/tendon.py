@@ -2,18 +2,8 @@
 
 from typing import ClassVar
 
-from dap3d_core.interface import hookimpl, numbers, vectors
-from dap3d_core.interface import points as places
-from dap3d_core.kernels import (
-    add,
-    by_body,
-    cable_length,
-    cable_pulls,
-    cable_rate,
-    cable_spans,
-    cross,
-    scale,
-)
+from dap3d_core.interface import hookimpl
+from dap3d_core.kernels import by_body, cable_length, cable_rate, cable_spans, cross, scale
 from dap3d_forces.actuator import kept
 from dap3d_forces.bounds import within
 from dap3d_forces.tendon_law import (
@@ -24,12 +14,12 @@ from dap3d_forces.tendon_law import (
     passive,
     stored,
 )
-from dap3d_joints.tendon import check_drums
+from dap3d_joints.tendon import Route, pulls_of
 
 interface_version = 1
 
 
-class Tendon(TendonLaw):
+class Tendon(Route, TendonLaw):
     """Spring and damper, or an actuator, along a massless cable that wraps over drums.
 
     The cable runs from point to point, and without friction over the ``drums`` between them: the
@@ -59,29 +49,9 @@ class Tendon(TendonLaw):
     keyword = "tendon"
     synonyms = ("muscle", "wrap", "drum", "capstan", "tackle")
     example: ClassVar[dict[str, str]] = {"k": "1e3"}
-    samples: ClassVar = (
-        {"points": (0, 1), "drums": (2,), "after": (1.0,), "sides": (0,), "ways": (1.0,)},
-        {"points": (0, 1, 1, 2), "drums": (2, 0), "axes": (2,), "sides": (2, 1),
-         "after": (1.0, 3.0), "ways": (1.0, 0.0), "divisors": (2.0, 0.0, 1.0, 1.0)},
-    )  # fmt: skip
-    points: tuple = places("n", least=2, doc="ends, and points that it is led over, in order")
-    drums: tuple = places("m", least=0, doc="centres of the drums")
-    after: tuple = numbers("m", 0.0, constant=True, doc="the point before each drum, from 1")
-    radii: tuple = numbers("m", 1.0, positive=True, unit="m", doc="radii of the drums")
-    axes: tuple = vectors("a", least=0, doc="axes of the drums that are cylinders, the first ones")
-    sides: tuple = places("s", least=0, doc="points on whose side the cable passes, of each drum")
-    ways: tuple = numbers("m", 0.0, constant=True, doc="past each drum: 0, 1 or 2 as above")
-    divisors: tuple = numbers("n", 1.0, constant=True, doc="by which spans count less; 0 for none")
 
     def prepare(self, bodies):
-        found = {name: [pose.place(P) for P, pose in zip(getattr(self, name), bodies[name],
-                                                         strict=True)]
-                 for name in ("points", "drums", "sides")}  # fmt: skip
-        axes = [pose.to_global(a) for a, pose in zip(self.axes, bodies["axes"], strict=True)]
-        check_drums(self, bodies)
-        drums = found["drums"], self.radii, axes, found["sides"]
-        path = cable_spans(found["points"], *drums, self.after, self.ways, self.divisors)
-        return numbers_of(self, cable_length(path))
+        return numbers_of(self, self.length_at_start(bodies))
 
     def wrench(r_points, s_points, v_points, on_points, body_count, r_drums, s_drums, v_drums,
                w_drums, on_drums, axes, r_sides, radii, after, ways, divisors, spring):  # fmt: skip
@@ -186,9 +156,7 @@ class Muscle(Lagging, activation="muscle"):
 
 def acting(T, path, s, on_points, s_drums, on_drums, body_count):
     """The wrench of a tension on each body."""
-    at_points, at_drums = cable_pulls(path)
-    parts = [(on_points[k], s[k], F) for k, F in at_points]
-    parts += [(on_drums[b], add(s_drums[b], arm), F) for b, arm, F in at_drums]
+    parts = pulls_of(path, on_points, s, on_drums, s_drums)
     forces = [(on, s, scale(T, F)) for on, s, F in parts]
     return by_body(
         [on for on, _, _ in forces], [(F, cross(s, F)) for _, s, F in forces], body_count

@@ -1,5 +1,7 @@
 """Rotational spring, damper and actuator."""
 
+import attrs
+
 from dap3d_core.interface import (
     Body,
     Force,
@@ -21,7 +23,23 @@ interface_version = 1
 ZERO = (0.0, 0.0, 0.0)
 
 
-class Torsion(Force):
+class AngleFields:
+    """Fields of what acts by the angle between two bodies."""
+
+    joint: str = joint_fields(
+        "body_i", "body_j", axis="a_j", acts_in="angle", doc="the hinge that it acts in"
+    )
+    body_i: Body = body(default=None, doc="body i; that of v_i")
+    body_j: Body = body(default=None, doc="body j; that of v_j")
+    v_i: Vector = vector(None, across="axis", doc="direction it is measured from, on body i")
+    v_j: Vector = vector(None, across="axis", doc="direction it is measured to, on body j")
+    axis: Vector = vector(doc="common axis, on either body")
+
+
+attrs.define(AngleFields, slots=False, kw_only=True)
+
+
+class Torsion(AngleFields, Force):
     """Spring, damper and actuator, in parallel, about an axis u common to two bodies.
 
     A positive n_a increases the angle that a ``rev`` or ``cyl`` about u of the same bodies i and j
@@ -48,14 +66,7 @@ class Torsion(Force):
     actuates = "n_a"
     symbol = "ring"
     energy_where = "where the bodies turn about the common axis, and without n_a"
-    joint: str = joint_fields(
-        "body_i", "body_j", axis="a_j", acts_in="angle", doc="the hinge that it acts in"
-    )
-    body_i: Body = body(default=None, doc="body i; that of v_i")
-    body_j: Body = body(default=None, doc="body j; that of v_j")
-    v_i: Vector = vector(None, across="axis", doc="direction it is measured from, on body i")
-    v_j: Vector = vector(None, across="axis", doc="direction it is measured to, on body j")
-    axis: Vector = vector(doc="common axis, on either body")
+
     k: float = number(default=0.0, unit="N m/rad", usual=(0.0, None), doc="stiffness")
     c: float = number(default=0.0, unit="N m s/rad", usual=(0.0, None), doc="damping coefficient")
     theta_0: float = number(default=0.0, unit="rad", doc="angle without moment of the spring")

@@ -1,11 +1,10 @@
 """Constant velocity joint: two shafts meet in a point and turn at the same rate."""
 
 from dap3d_core.interface import Joint, Point, Vector, hookimpl, point, vector
-from dap3d_core.kernels import add, cross, dot, eye, hstack, neg, normals, row, skew, sub
+from dap3d_core.kernels import add, cross, dot, neg, normals, row, sub
+from dap3d_joints.relative_rows import ZERO, point_gamma, point_rows
 
 interface_version = 1
-
-ZERO = (0.0, 0.0, 0.0)
 
 
 class ConstantVelocity(Joint):
@@ -45,16 +44,14 @@ class ConstantVelocity(Joint):
 
     def J(s_P_i, s_P_j, n_i, m_i, n_j, m_j):
         c = sub(cross(n_i, m_j), cross(m_i, n_j))
-        return (
-            (*hstack(eye(-1.0), skew(s_P_i)), row(ZERO, c)),
-            (*hstack(eye(1.0), skew(neg(s_P_j))), row(ZERO, neg(c))),
-        )
+        i, j = point_rows(s_P_i, s_P_j)
+        return (*i, row(ZERO, c)), (*j, row(ZERO, neg(c)))
 
     def gamma(s_P_i, s_P_j, n_i, m_i, n_j, m_j, n_i_dot, m_i_dot, n_j_dot, m_j_dot, w_i, w_j):
         first = add(cross(n_i_dot, m_j), cross(n_i, m_j_dot))
         second = add(cross(m_i_dot, n_j), cross(m_i, n_j_dot))
-        point_rows = sub(cross(w_i, cross(w_i, s_P_i)), cross(w_j, cross(w_j, s_P_j)))
-        return (*point_rows, dot(sub(first, second), sub(w_j, w_i)))
+        turning = dot(sub(first, second), sub(w_j, w_i))
+        return (*point_gamma(s_P_i, s_P_j, w_i, w_j), turning)
 
 
 def carried(x, v, u):

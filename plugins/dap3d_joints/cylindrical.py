@@ -1,12 +1,11 @@
 """Cylindrical joint: a body turns about an axis and slides along it."""
 
 from dap3d_core.interface import Contact, Joint, Vector, Vector2, hookimpl, vector, vector2
-from dap3d_core.kernels import add, cross, dot, neg, normals, row, scale, sub, tanh
+from dap3d_core.kernels import add, cross, dot, neg, normals, scale, sub, tanh
 from dap3d_joints.coulomb import magnitude
+from dap3d_joints.relative_rows import axis_gamma, axis_rows, line_gamma, line_rows
 
 interface_version = 1
-
-ZERO = (0.0, 0.0, 0.0)
 
 
 class Cylindrical(Joint):
@@ -42,34 +41,22 @@ class Cylindrical(Joint):
         return dot(a_i, n_j), dot(a_i, m_j), dot(d, n_j), dot(d, m_j)
 
     def J(a_i, n_j, m_j, s_P_i, r_P_i, r_j):
-        p, q = cross(a_i, n_j), cross(a_i, m_j)
-        arm = sub(r_P_i, r_j)  # s_j - d
-        return (
-            (
-                row(ZERO, p),
-                row(ZERO, q),
-                row(neg(n_j), neg(cross(s_P_i, n_j))),
-                row(neg(m_j), neg(cross(s_P_i, m_j))),
-            ),
-            (
-                row(ZERO, neg(p)),
-                row(ZERO, neg(q)),
-                row(n_j, cross(arm, n_j)),
-                row(m_j, cross(arm, m_j)),
-            ),
+        arms = s_P_i, r_P_i, r_j
+        rows = (
+            axis_rows(a_i, n_j),
+            axis_rows(a_i, m_j),
+            line_rows(n_j, *arms),
+            line_rows(m_j, *arms),
         )
+        return tuple(zip(*rows, strict=True))
 
     def gamma(a_i, n_j, m_j, d, a_i_dot, n_j_dot, m_j_dot, d_dot, s_P_i_dot, s_P_j_dot, w_i, w_j):
-        w = sub(w_j, w_i)
-        p_dot = add(cross(a_i_dot, n_j), cross(a_i, n_j_dot))
-        q_dot = add(cross(a_i_dot, m_j), cross(a_i, m_j_dot))
-        centripetal = cross(w_i, s_P_i_dot)
-        slide = sub(add(cross(w_j, d), s_P_j_dot), scale(2.0, d_dot))
+        motion = d, d_dot, s_P_i_dot, s_P_j_dot, w_i, w_j
         return (
-            dot(p_dot, w),
-            dot(q_dot, w),
-            dot(centripetal, n_j) + dot(slide, n_j_dot),
-            dot(centripetal, m_j) + dot(slide, m_j_dot),
+            axis_gamma(a_i, n_j, a_i_dot, n_j_dot, w_i, w_j),
+            axis_gamma(a_i, m_j, a_i_dot, m_j_dot, w_i, w_j),
+            line_gamma(n_j, n_j_dot, *motion),
+            line_gamma(m_j, m_j_dot, *motion),
         )
 
     def friction(lam, mu, v_tol, radius, a_j, s_P_i, r_P_i, v_P_i, r_j, v_j, w_i, w_j):

@@ -42,12 +42,7 @@ class DrivenRotation(Joint):
     synonyms = ("motion", "rotational-motion", "driver")
     symbol = "ring"
     drives = True
-    joint: str = joint_fields(
-        "body_i",
-        "body_j",
-        "a_j",
-        doc="the joint whose coordinate it drives, in place of bodies and axis",
-    )
+    joint: str = joint_fields("body_i", "body_j", "a_j", doc="the joint whose coordinate it drives")
     body_i: Body = body(doc="body that is turned")
     body_j: Body = body(default="ground", doc="body that the rotation is measured from")
     a_j: Vector = vector(doc="axis, on body j")

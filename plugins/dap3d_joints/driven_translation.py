@@ -14,7 +14,8 @@ from dap3d_core.interface import (
     point,
     vector,
 )
-from dap3d_core.kernels import add, cross, dot, neg, row, scale, sub
+from dap3d_core.kernels import add, cross, dot, scale, sub
+from dap3d_joints.relative_rows import offset_rows
 
 interface_version = 1
 
@@ -61,8 +62,7 @@ class DrivenTranslation(Joint):
         return dot(a_j, sub(r_P_i, r_P_j)) - length - (f - counted * f_0)
 
     def J(a_j, s_P_i, r_P_i, r_j):
-        arm = sub(r_P_i, r_j)  # s_j - d
-        return row(a_j, cross(s_P_i, a_j)), row(neg(a_j), neg(cross(arm, a_j)))
+        return offset_rows(a_j, s_P_i, r_P_i, r_j)
 
     def nu(f_dot):
         return f_dot

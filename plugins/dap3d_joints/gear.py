@@ -5,6 +5,8 @@ from fractions import Fraction
 from typing import ClassVar
 from warnings import warn
 
+import attrs
+
 from dap3d_core.interface import (
     Joint,
     Point,
@@ -29,7 +31,38 @@ MISFIT = 1e-6
 PRESSURE_ANGLE = 0.3490658503988659
 
 
-class Gear(Joint):
+class Wheels:
+    """Fields of two toothed wheels in mesh."""
+
+    example: ClassVar[Mapping[str, str]] = {
+        "P_i": '"crank.O"',
+        "P_j": '"rod.O"',
+        "a_i": '"crank.y"',
+        "a_j": '"rod.y"',
+        "teeth_i": "20",
+        "teeth_j": "40",
+    }
+    joint_i: str = joint_fields(P_i="P", a_i="a", doc="hinge of wheel i")
+    joint_j: str = joint_fields(P_j="P", a_j="a", doc="hinge of wheel j")
+    P_i: Point = point(default=None, doc="on the axis of wheel i; its mass centre when left out")
+    P_j: Point = point(default=None, doc="on the axis of wheel j; its mass centre when left out")
+    a_i: Vector = vector(doc="axis of wheel i, on the wheel")
+    a_j: Vector = vector(doc="axis of wheel j, on the wheel, or on ground for a fixed ring")
+    teeth_i: float = number(default=None, minimum=1.0, whole=True, doc="teeth of wheel i")
+    teeth_j: float = number(default=None, minimum=1.0, whole=True, doc="teeth of wheel j")
+    radius_i: float = number(default=None, unit="m", positive=True, doc="pitch radius of wheel i")
+    radius_j: float = number(default=None, unit="m", positive=True, doc="pitch radius of wheel j")
+    pressure_angle: float = number(PRESSURE_ANGLE, unit="rad", minimum=0.0, maximum=1.0,
+                                   doc="of the teeth, 20 deg by default")  # fmt: skip
+    helix: float = number(0.0, unit="rad", usual=(-0.8, 0.8), doc="helix angle of wheel i")
+    internal: bool = choice((False, True), False, doc="one wheel is a ring with teeth inside")
+    bevel: bool = choice((False, True), False, doc="the axes meet")
+
+
+attrs.define(Wheels, slots=False, kw_only=True)
+
+
+class Gear(Wheels, Joint):
     """Wheels i and j stay in mesh; the reaction is a force at the pitch point of both.
 
     The bearings are joints of their own, and carry the tooth force; wherever they are, on ground or
@@ -70,29 +103,6 @@ class Gear(Joint):
     synonyms = ("gears", "gearpair", "spur", "bevel", "spur-gear", "bevel-gear")
     symbol = "link"
     brings = ("pressure_angle", "gear_separation", "mesh")
-    example: ClassVar[Mapping[str, str]] = {
-        "P_i": '"crank.O"',
-        "P_j": '"rod.O"',
-        "a_i": '"crank.y"',
-        "a_j": '"rod.y"',
-        "teeth_i": "20",
-        "teeth_j": "40",
-    }
-    joint_i: str = joint_fields(P_i="P", a_i="a", doc="hinge of wheel i")
-    joint_j: str = joint_fields(P_j="P", a_j="a", doc="hinge of wheel j")
-    P_i: Point = point(default=None, doc="on the axis of wheel i; its mass centre when left out")
-    P_j: Point = point(default=None, doc="on the axis of wheel j; its mass centre when left out")
-    a_i: Vector = vector(doc="axis of wheel i, on the wheel")
-    a_j: Vector = vector(doc="axis of wheel j, on the wheel, or on ground for a fixed ring")
-    teeth_i: float = number(default=None, minimum=1.0, whole=True, doc="teeth of wheel i")
-    teeth_j: float = number(default=None, minimum=1.0, whole=True, doc="teeth of wheel j")
-    radius_i: float = number(default=None, unit="m", positive=True, doc="pitch radius of wheel i")
-    radius_j: float = number(default=None, unit="m", positive=True, doc="pitch radius of wheel j")
-    pressure_angle: float = number(PRESSURE_ANGLE, unit="rad", minimum=0.0, maximum=1.0,
-                                   doc="of the teeth, 20 deg by default")  # fmt: skip
-    helix: float = number(0.0, unit="rad", usual=(-0.8, 0.8), doc="helix angle of wheel i")
-    internal: bool = choice((False, True), False, doc="one wheel is a ring with teeth inside")
-    bevel: bool = choice((False, True), False, doc="the axes meet")
 
     def prepare(self, bodies):
         return meshing(self, bodies)

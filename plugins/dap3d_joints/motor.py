@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import ClassVar
 
+import attrs
+
 from dap3d_core.interface import (
     Body,
     Joint,
@@ -25,7 +27,24 @@ interface_version = 1
 ZERO = (0.0, 0.0, 0.0)
 
 
-class Motor(Joint):
+class CoordinateFields:
+    """Fields of what moves the coordinate of a joint."""
+
+    joint: str = joint_fields(
+        "body_i", "body_j", "P_i", "P_j", "a_j", facts=("coordinate",), doc="joint that it moves"
+    )
+    body_i: Body = body(default=None, doc="body that is moved; that of P_i")
+    body_j: Body = body(default=None, doc="body that holds what moves it; that of P_j and a_j")
+    P_i: Point = point(default=None, doc="on body i; the mass centre when left out")
+    P_j: Point = point(default=None, doc="on body j; the mass centre when left out")
+    a_j: Vector = vector(doc="axis, on body j")
+    coordinate: str = choice(("angle", "length"), None, doc="the joint's when left out, else angle")
+
+
+attrs.define(CoordinateFields, slots=False, kw_only=True)
+
+
+class Motor(CoordinateFields, Joint):
     """A motor in a joint prescribes its coordinate q, or the rate of it.
 
     q is the angle theta by which body i has turned against body j about a_j, or the length x by
@@ -53,15 +72,7 @@ class Motor(Joint):
     symbol = "ring"
     drives = True
     example: ClassVar[Mapping[str, str]] = {"position": "0.5"}
-    joint: str = joint_fields(
-        "body_i", "body_j", "P_i", "P_j", "a_j", facts=("coordinate",), doc="joint that it moves"
-    )
-    body_i: Body = body(default=None, doc="body that is moved; that of P_i")
-    body_j: Body = body(default=None, doc="body that holds the motor; that of P_j and a_j")
-    P_i: Point = point(default=None, doc="on body i; the mass centre when left out")
-    P_j: Point = point(default=None, doc="on body j; the mass centre when left out")
-    a_j: Vector = vector(doc="axis, on body j")
-    coordinate: str = choice(("angle", "length"), None, doc="the joint's when left out, else angle")
+
     position: float = number(
         default=None,
         unit="rad or m",

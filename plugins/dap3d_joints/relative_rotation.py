@@ -35,12 +35,7 @@ class RelativeRotation(Joint):
     keyword, rows, holonomic = "rel-rot", 1, False
     symbol = "ring"
     drives = True
-    joint: str = joint_fields(
-        "body_i",
-        "body_j",
-        "a_j",
-        doc="the joint whose coordinate it drives, in place of bodies and axis",
-    )
+    joint: str = joint_fields("body_i", "body_j", "a_j", doc="the joint whose coordinate it drives")
     body_i: Body = body(doc="body whose rotation the driver is measured from")
     body_j: Body = body(default="ground", doc="body that is turned")
     a_j: Vector = vector(doc="axis, on body j")

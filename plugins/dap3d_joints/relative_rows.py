@@ -1,8 +1,18 @@
-"""Rows that joints share: an axis along another, a point's coordinate, an angle about an axis."""
+"""Rows that joints share: points that meet, an axis along another, coordinates, angles."""
 
-from dap3d_core.kernels import add, cross, dot, neg, row, scale, sub
+from dap3d_core.kernels import add, cross, dot, eye, hstack, neg, row, scale, skew, sub
 
 ZERO = (0.0, 0.0, 0.0)
+
+
+def point_rows(s_P_i, s_P_j):
+    """Jacobian of r_Pj - r_Pi: three rows of body i, and three of body j."""
+    return hstack(eye(-1.0), skew(s_P_i)), hstack(eye(1.0), skew(neg(s_P_j)))
+
+
+def point_gamma(s_P_i, s_P_j, w_i, w_j):
+    """Gamma of r_Pj - r_Pi: w_i x (w_i x s_i) - w_j x (w_j x s_j)."""
+    return sub(cross(w_i, cross(w_i, s_P_i)), cross(w_j, cross(w_j, s_P_j)))
 
 
 def axis_rows(a_i, b_j):
@@ -26,6 +36,17 @@ def offset_gamma(b_j, b_j_dot, d, d_dot, s_P_i_dot, s_P_j_dot, w_i, w_j):
     """Gamma of x = b_j . d with d = r_Pi - r_Pj."""
     slide = sub(sub(cross(w_j, d), s_P_j_dot), scale(2.0, d_dot))
     return dot(slide, b_j_dot) - dot(cross(w_i, s_P_i_dot), b_j)
+
+
+def line_rows(b_j, s_P_i, r_P_i, r_j):
+    """Jacobian of d . b_j with d = r_Pj - r_Pi: a row of body i, and one of body j."""
+    return row(neg(b_j), neg(cross(s_P_i, b_j))), row(b_j, cross(sub(r_P_i, r_j), b_j))
+
+
+def line_gamma(b_j, b_j_dot, d, d_dot, s_P_i_dot, s_P_j_dot, w_i, w_j):
+    """Gamma of d . b_j with d = r_Pj - r_Pi."""
+    slide = sub(add(cross(w_j, d), s_P_j_dot), scale(2.0, d_dot))
+    return dot(cross(w_i, s_P_i_dot), b_j) + dot(slide, b_j_dot)
 
 
 def turning(a_j, u_i):

@@ -37,12 +37,7 @@ class RelativeTranslation(Joint):
 
     keyword, rows, holonomic = "rel-tran", 1, False
     drives = True
-    joint: str = joint_fields(
-        "body_i",
-        "body_j",
-        "a_j",
-        doc="the joint whose coordinate it drives, in place of bodies and axis",
-    )
+    joint: str = joint_fields("body_i", "body_j", "a_j", doc="the joint whose coordinate it drives")
     body_i: Body = body(doc="body that the motion is measured from")
     body_j: Body = body(default="ground", doc="body that is moved")
     a_j: Vector = vector(doc="direction, on body j")

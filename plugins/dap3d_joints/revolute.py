@@ -1,25 +1,11 @@
 """Revolute joint: two bodies share a point and an axis through it."""
 
 from dap3d_core.interface import Contact, Joint, Point, Vector, hookimpl, point, vector
-from dap3d_core.kernels import (
-    add,
-    cross,
-    dot,
-    eye,
-    hstack,
-    neg,
-    normals,
-    row,
-    scale,
-    skew,
-    sub,
-    tanh,
-)
+from dap3d_core.kernels import dot, neg, normals, scale, sub, tanh
 from dap3d_joints.coulomb import magnitude
+from dap3d_joints.relative_rows import ZERO, axis_gamma, axis_rows, point_gamma, point_rows
 
 interface_version = 1
-
-ZERO = (0.0, 0.0, 0.0)
 
 
 class Revolute(Joint):
@@ -55,18 +41,14 @@ class Revolute(Joint):
         return (*sub(r_P_j, r_P_i), dot(a_i, n_j), dot(a_i, m_j))
 
     def J(s_P_i, s_P_j, a_i, n_j, m_j):
-        n, m = cross(a_i, n_j), cross(a_i, m_j)
-        return (
-            (*hstack(eye(-1.0), skew(s_P_i)), row(ZERO, n), row(ZERO, m)),
-            (*hstack(eye(1.0), skew(neg(s_P_j))), row(ZERO, neg(n)), row(ZERO, neg(m))),
-        )
+        i, j = point_rows(s_P_i, s_P_j)
+        n, m = axis_rows(a_i, n_j), axis_rows(a_i, m_j)
+        return (*i, n[0], m[0]), (*j, n[1], m[1])
 
     def gamma(s_P_i, s_P_j, a_i, n_j, m_j, a_i_dot, n_j_dot, m_j_dot, w_i, w_j):
-        w = sub(w_j, w_i)
-        n_dot = add(cross(a_i_dot, n_j), cross(a_i, n_j_dot))
-        m_dot = add(cross(a_i_dot, m_j), cross(a_i, m_j_dot))
-        point_rows = sub(cross(w_i, cross(w_i, s_P_i)), cross(w_j, cross(w_j, s_P_j)))
-        return (*point_rows, dot(n_dot, w), dot(m_dot, w))
+        n = axis_gamma(a_i, n_j, a_i_dot, n_j_dot, w_i, w_j)
+        m = axis_gamma(a_i, m_j, a_i_dot, m_j_dot, w_i, w_j)
+        return (*point_gamma(s_P_i, s_P_j, w_i, w_j), n, m)
 
     def friction(lam, mu, v_tol, radius, a_j, w_i, w_j):
         load = mu * magnitude((lam[0], lam[1], lam[2]))

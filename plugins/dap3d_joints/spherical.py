@@ -1,12 +1,11 @@
 """Spherical joint: point P_i of body i and point P_j of body j stay together."""
 
 from dap3d_core.interface import Contact, Joint, Point, hookimpl, point
-from dap3d_core.kernels import cross, eye, hstack, neg, scale, skew, sub
+from dap3d_core.kernels import neg, scale, sub
 from dap3d_joints.coulomb import against, magnitude
+from dap3d_joints.relative_rows import ZERO, point_gamma, point_rows
 
 interface_version = 1
-
-ZERO = (0.0, 0.0, 0.0)
 
 
 class Spherical(Joint):
@@ -32,10 +31,10 @@ class Spherical(Joint):
         return sub(r_P_j, r_P_i)
 
     def J(s_P_i, s_P_j):
-        return hstack(eye(-1.0), skew(s_P_i)), hstack(eye(1.0), skew(neg(s_P_j)))
+        return point_rows(s_P_i, s_P_j)
 
     def gamma(s_P_i, s_P_j, w_i, w_j):
-        return sub(cross(w_i, cross(w_i, s_P_i)), cross(w_j, cross(w_j, s_P_j)))
+        return point_gamma(s_P_i, s_P_j, w_i, w_j)
 
     def friction(lam, mu, v_tol, radius, w_i, w_j):
         sliding = scale(radius, sub(w_i, w_j))

@@ -2,6 +2,8 @@
 
 from typing import ClassVar
 
+import attrs
+
 from dap3d_core.interface import Joint, hookimpl, number, numbers, vectors
 from dap3d_core.interface import points as places
 from dap3d_core.kernels import (
@@ -18,7 +20,39 @@ from dap3d_core.kernels import (
 interface_version = 1
 
 
-class Tendon(Joint):
+class Route:
+    """Fields of what is led over points and drums."""
+
+    samples: ClassVar = (
+        {"points": (0, 1), "drums": (2,), "after": (1.0,), "sides": (0,), "ways": (1.0,)},
+        {"points": (0, 1, 1, 2), "drums": (2, 0), "axes": (2,), "sides": (2, 1),
+         "after": (1.0, 3.0), "ways": (1.0, 0.0), "divisors": (2.0, 0.0, 1.0, 1.0)},
+    )  # fmt: skip
+    points: tuple = places("n", least=2, doc="ends, and points that it is led over, in order")
+    drums: tuple = places("m", least=0, doc="centres of the drums")
+    after: tuple = numbers("m", 0.0, constant=True, doc="the point before each drum, from 1")
+    radii: tuple = numbers("m", 1.0, positive=True, unit="m", doc="radii of the drums")
+    axes: tuple = vectors("a", least=0, doc="axes of the drums that are cylinders, the first ones")
+    sides: tuple = places("s", least=0, doc="points on whose side the tendon passes, of each drum")
+    ways: tuple = numbers("m", 0.0, constant=True, doc="past each drum: 0, 1 or 2")
+    divisors: tuple = numbers("n", 1.0, constant=True, doc="by which spans count less; 0 for none")
+
+    def length_at_start(self, bodies):
+        """The length in the poses of the scene; drums that contradict each other are refused."""
+        check_drums(self, bodies)
+        r, drums, sides = (
+            [pose.place(P) for P, pose in zip(getattr(self, name), bodies[name], strict=True)]
+            for name in ("points", "drums", "sides")
+        )
+        axes = [pose.to_global(a) for a, pose in zip(self.axes, bodies["axes"], strict=True)]
+        lists = self.after, self.ways, self.divisors
+        return cable_length(cable_spans(r, drums, self.radii, axes, sides, *lists))
+
+
+attrs.define(Route, slots=False, kw_only=True)
+
+
+class Tendon(Route, Joint):
     """The length L of a tendon over points, drums and pulleys is constant.
 
     L is that of the force ``tendon``, with the same fields:
@@ -34,30 +68,11 @@ class Tendon(Joint):
 
     keyword, rows = "tendon", 1
     synonyms = ("wrap", "drum")
-    samples: ClassVar = (
-        {"points": (0, 1), "drums": (2,), "after": (1.0,), "sides": (0,), "ways": (1.0,)},
-        {"points": (0, 1, 1, 2), "drums": (2, 0), "axes": (2,), "sides": (2, 1),
-         "after": (1.0, 3.0), "ways": (1.0, 0.0), "divisors": (2.0, 0.0, 1.0, 1.0)},
-    )  # fmt: skip
-    points: tuple = places("n", least=2, doc="ends, and points that it is led over, in order")
-    drums: tuple = places("m", least=0, doc="centres of the drums")
-    after: tuple = numbers("m", 0.0, constant=True, doc="the point before each drum, from 1")
-    radii: tuple = numbers("m", 1.0, positive=True, unit="m", doc="radii of the drums")
-    axes: tuple = vectors("a", least=0, doc="axes of the drums that are cylinders, the first ones")
-    sides: tuple = places("s", least=0, doc="points on whose side the tendon passes, of each drum")
-    ways: tuple = numbers("m", 0.0, constant=True, doc="past each drum: 0, 1 or 2")
-    divisors: tuple = numbers("n", 1.0, constant=True, doc="by which spans count less; 0 for none")
     length: float = number(None, unit="m", doc="as at the start where left out")
 
     def prepare(self, bodies):
-        check_drums(self, bodies)
-        r, drums, sides = (
-            [pose.place(P) for P, pose in zip(getattr(self, name), bodies[name], strict=True)]
-            for name in ("points", "drums", "sides")
-        )
-        axes = [pose.to_global(a) for a, pose in zip(self.axes, bodies["axes"], strict=True)]
-        path = cable_spans(r, drums, self.radii, axes, sides, self.after, self.ways, self.divisors)
-        return {"length": cable_length(path) if self.length is None else self.length}
+        start = self.length_at_start(bodies)
+        return {"length": start if self.length is None else self.length}
 
     def C(r_points, r_drums, axes, r_sides, radii, after, ways, divisors, length):
         path = cable_spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
@@ -66,9 +81,7 @@ class Tendon(Joint):
     def J(r_points, s_points, on_points, r_drums, s_drums, on_drums, axes, r_sides,
           radii, after, ways, divisors, body_count):  # fmt: skip
         path = cable_spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
-        at_points, at_drums = cable_pulls(path)
-        parts = [(on_points[k], s_points[k], F) for k, F in at_points]
-        parts += [(on_drums[b], add(s_drums[b], arm), F) for b, arm, F in at_drums]
+        parts = pulls_of(path, on_points, s_points, on_drums, s_drums)
         rows = [(row(F, cross(s, F)),) for _, s, F in parts]
         return by_body([on for on, _, _ in parts], rows, body_count)
 
@@ -80,6 +93,13 @@ class Tendon(Joint):
         return cable_bending(
             path, (r_points, v_points, turning), (r_drums, v_drums, about, w_drums), axes, ways
         )
+
+
+def pulls_of(path, on_points, s_points, on_drums, s_drums):
+    """(body, arm, force) of a tension of 1, wherever it acts."""
+    at_points, at_drums = cable_pulls(path)
+    parts = [(on_points[k], s_points[k], F) for k, F in at_points]
+    return parts + [(on_drums[b], add(s_drums[b], arm), F) for b, arm, F in at_drums]
 
 
 def check_drums(tendon, bodies):

@@ -10,13 +10,13 @@ from dap3d_core.kernels import (
     hstack,
     neg,
     normals,
-    row,
     scale,
     sub,
     tanh,
 )
 from dap3d_joints.coulomb import magnitude
 from dap3d_joints.orientation import error, error_rate, turn
+from dap3d_joints.relative_rows import line_gamma, line_rows
 
 interface_version = 1
 
@@ -65,27 +65,18 @@ class Translational(Joint):
 
     def J(p_i, p_j, p_c, n_j, m_j, s_P_i, r_P_i, r_j):
         q0, e = error(p_j, p_c, p_i)
-        arm = sub(r_P_i, r_j)  # s_j - d
+        n, m = line_rows(n_j, s_P_i, r_P_i, r_j), line_rows(m_j, s_P_i, r_P_i, r_j)
         return (
-            (
-                *hstack(eye(0.0), turn(-q0, e)),
-                row(neg(n_j), neg(cross(s_P_i, n_j))),
-                row(neg(m_j), neg(cross(s_P_i, m_j))),
-            ),
-            (*hstack(eye(0.0), turn(q0, e)), row(n_j, cross(arm, n_j)), row(m_j, cross(arm, m_j))),
+            (*hstack(eye(0.0), turn(-q0, e)), n[0], m[0]),
+            (*hstack(eye(0.0), turn(q0, e)), n[1], m[1]),
         )
 
     def gamma(p_i, p_j, p_c, d, d_dot, n_j, m_j, n_j_dot, m_j_dot, s_P_i_dot, s_P_j_dot, w_i, w_j):
         q0, e = error(p_j, p_c, p_i)
         q0_dot, e_dot = error_rate(q0, e, w_i, w_j)
         turning = add(scale(-q0_dot, sub(w_j, w_i)), cross(e_dot, add(w_i, w_j)))
-        centripetal = cross(w_i, s_P_i_dot)
-        slide = sub(add(cross(w_j, d), s_P_j_dot), scale(2.0, d_dot))
-        return (
-            *turning,
-            dot(centripetal, n_j) + dot(slide, n_j_dot),
-            dot(centripetal, m_j) + dot(slide, m_j_dot),
-        )
+        motion = d, d_dot, s_P_i_dot, s_P_j_dot, w_i, w_j
+        return (*turning, line_gamma(n_j, n_j_dot, *motion), line_gamma(m_j, m_j_dot, *motion))
 
     def friction(lam, mu, v_tol, a_j, s_P_i, r_P_i, v_P_i, r_j, v_j, w_j):
         arm = sub(r_P_i, r_j)

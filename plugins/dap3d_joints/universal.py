@@ -1,11 +1,10 @@
 """Universal joint: two bodies share a point, and the arms of a cross stay perpendicular."""
 
 from dap3d_core.interface import Joint, Point, Vector, hookimpl, point, vector
-from dap3d_core.kernels import add, cross, dot, eye, hstack, neg, row, skew, sub
+from dap3d_core.kernels import dot, sub
+from dap3d_joints.relative_rows import axis_gamma, axis_rows, point_gamma, point_rows
 
 interface_version = 1
-
-ZERO = (0.0, 0.0, 0.0)
 
 
 class Universal(Joint):
@@ -31,16 +30,12 @@ class Universal(Joint):
         return (*sub(r_P_j, r_P_i), dot(a_i, n_j))
 
     def J(s_P_i, s_P_j, a_i, n_j):
-        c = cross(a_i, n_j)
-        return (
-            (*hstack(eye(-1.0), skew(s_P_i)), row(ZERO, c)),
-            (*hstack(eye(1.0), skew(neg(s_P_j))), row(ZERO, neg(c))),
-        )
+        (i, j), n = point_rows(s_P_i, s_P_j), axis_rows(a_i, n_j)
+        return (*i, n[0]), (*j, n[1])
 
     def gamma(s_P_i, s_P_j, a_i, n_j, a_i_dot, n_j_dot, w_i, w_j):
-        c_dot = add(cross(a_i_dot, n_j), cross(a_i, n_j_dot))
-        point_rows = sub(cross(w_i, cross(w_i, s_P_i)), cross(w_j, cross(w_j, s_P_j)))
-        return (*point_rows, dot(c_dot, sub(w_j, w_i)))
+        n = axis_gamma(a_i, n_j, a_i_dot, n_j_dot, w_i, w_j)
+        return (*point_gamma(s_P_i, s_P_j, w_i, w_j), n)
 
 
 @hookimpl

@@ -50,7 +50,7 @@ def test_contacts_that_once_ended_falsely(number):
 
 
 @pytest.mark.every(4)
-@pytest.mark.parametrize("number", [1_000_006, 1_635_495, 1_925_281])
+@pytest.mark.parametrize("number", [1_000_006, 1_066_419, 1_635_495, 1_925_281])
 def test_contacts_that_jam_are_named(number):
     """Again and again behind impulses that set them free, or with no forces where they begin."""
     assert check_contacts(str(number).encode()) == "jams"

@@ -29,10 +29,17 @@ from dap3d_core.formulations.programs.scene_program import (
 from dap3d_core.integrators.radau.integration import RadauIntegration
 from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.stepping.integration import Refusals, off_constraints
-from dap3d_core.integrators.stepping.integration_state import LOGGED, MEASURES, IntegrationState
+from dap3d_core.integrators.stepping.integration_state import (
+    KIND,
+    LOGGED,
+    MEASURES,
+    NOISE,
+    IntegrationState,
+    Y,
+)
 from dap3d_core.interface.codegen.compile_loops import compile_all, write
 from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, stride
-from dap3d_core.interface.examine.sized_types import sample_classes
+from dap3d_core.interface.examine.sized_types import described, sample_classes
 from dap3d_core.interface.fields import sized_fields, slot_of, specs_of
 from dap3d_core.interface.formats import (
     FormatError,
@@ -44,7 +51,7 @@ from dap3d_core.interface.formats import (
     parse_xml,
     total_inertia,
 )
-from dap3d_core.interface.types import SYMBOLS, pose
+from dap3d_core.interface.types import SYMBOLS, BodyPose, pose
 from dap3d_core.kernels.compiler import background, objects, units
 from dap3d_core.kernels.compiler.derivatives import differentiate
 from dap3d_core.kernels.compiler.functions import Program
@@ -76,7 +83,7 @@ from dap3d_core.kernels.runtime.loop_modules import (
     source_of,
     unit_names,
 )
-from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, unwound
+from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P, unwound
 from dap3d_core.linear.ldlt.plan import make_plan
 from dap3d_core.linear.ordering.elimination_order import order_nodes
 from dap3d_core.model.rigid_motion import (
@@ -87,7 +94,7 @@ from dap3d_core.model.rigid_motion import (
     relative,
     rotation_vector,
 )
-from dap3d_core.model.rotations import rotation
+from dap3d_core.model.rotations import rotation, to_body, to_global
 from dap3d_core.model.state_layout import join, split, u_from_y, y_from_u
 from dap3d_core.registry.extensions import extensions
 from dap3d_core.result.arrays import COLUMNS, arrays_of
@@ -105,7 +112,7 @@ from dap3d_core.scene.expressions.expression import (
 from dap3d_core.scene.files.line_numbers import lines_of
 from dap3d_core.scene.files.read_toml import LARGEST_FILE, scene_of
 from dap3d_core.scene.validate.mistake_collector import Collector
-from dap3d_core.settings import INTEGRATORS, METHODS
+from dap3d_core.settings import FIXED_STEP, INTEGRATORS, METHODS
 from dap3d_core.simulation.checkpoint.save import (
     FORMAT,
     Checkpoint,

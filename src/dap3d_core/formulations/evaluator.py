@@ -426,13 +426,6 @@ class Evaluator:
             s.residual[s.row], s.nu[s.row], s.gamma[s.row], row, column, s.D[place], shape
         )
 
-    def placed_gamma(self, t: float, states: Floats) -> Floats:
-        """(rows,) gamma of bodies as they were placed last, with these states of elements."""
-        s = self.system
-        s.states[:] = states
-        self._call(ACCELERATION, t, s.D, s.gamma, s.nu)
-        return s.gamma[s.row]
-
     def _weigh_rows(self) -> None:
         """Weights of the rows, of residuals in m; in scenes of ordinary size they stay as they are.
 

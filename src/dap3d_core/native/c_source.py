@@ -27,7 +27,8 @@ KINDS = ("time", "input", "parameter", "output", "state", "derivative", "indicat
 #: Of these those that are parameters: set at any time, and before a run begins.
 PARAMETERS = ("parameter", "fixed")
 #: Limits of contact_jumps.py that the runtime has as well: gaps that touch; what comes to no end.
-LIMITS = ("TOUCHING", "TOUCHING_AT_START", "MOST_CHANGES", "WITHIN", "MOST_STEPS", "SLOW")
+LIMITS = ("TOUCHING", "TOUCHING_AT_START", "MOST_CHANGES", "WITHIN", "MOST_JAMS", "RATTLING",
+          "MOST_STEPS", "SLOW")  # fmt: skip
 
 
 @attrs.frozen

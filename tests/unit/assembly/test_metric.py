@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from support.internals import BODY_WIDTH, compiled
+from support.internals import BODY_WIDTH, JP, A, P, compiled
 from support.rotations import rotation
 
 from dap3d_core.assembly.metric import gyroscopic_moment, orient_by_state
-from dap3d_core.kernels.runtime.loop_support import JP, A, P
 
 
 @compiled

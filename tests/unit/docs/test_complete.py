@@ -14,7 +14,15 @@ import attrs
 import click
 import pytest
 from support.command_line import dap3d
-from support.internals import INTEGRATORS, METHODS, sample_classes, sized_fields, specs_of
+from support.internals import (
+    INTEGRATORS,
+    METHODS,
+    BodyPose,
+    described,
+    sample_classes,
+    sized_fields,
+    specs_of,
+)
 from support.process import REPOSITORY
 
 import dap3d_core as dap
@@ -27,8 +35,6 @@ from dap3d_core.interface.codegen.kernel_arguments import (
     friction_names,
     namespace,
 )
-from dap3d_core.interface.examine.sized_types import described
-from dap3d_core.interface.types import BodyPose
 from dap3d_core.scene import Simulation
 from dap3d_core.scene.coerce import keys_of
 from dap3d_core.scene.tables import HEADER_KEYS, NAMED, TABLES, Animation

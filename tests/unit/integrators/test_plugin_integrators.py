@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import dap3d_core as dap
+from dap3d_core.integrators import DOPRI5
 from dap3d_core.integrators.plugin_integrators import _of_package, integrator_named, tableau_of
-from dap3d_core.integrators.runge_kutta.dopri5 import DOPRI5
 from dap3d_core.interface import PluginError
 from dap3d_core.interface.integrators import RungeKuttaMethod
 

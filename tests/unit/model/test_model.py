@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from support.internals import join, split, u_from_y, y_from_u
+from support.internals import join, rotation, split, to_body, to_global, u_from_y, y_from_u
 from support.own_types import registry_of
 
 import dap3d_core as dap
 from dap3d_core.interface import Body, Force, Joint, Vector, body, number, vector
 from dap3d_core.kernels import row
 from dap3d_core.model import build_model
-from dap3d_core.model.rotations import rotation, to_body, to_global
 from dap3d_core.scene import AnimationPoint, check
 
 ZERO = (0.0, 0.0, 0.0)

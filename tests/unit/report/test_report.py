@@ -9,6 +9,7 @@ import attrs
 import numpy as np
 import pytest
 from support import problems
+from support.internals import FIXED_STEP
 from support.plain import long_in_plain_python
 
 import dap3d_core as dap
@@ -18,7 +19,6 @@ from dap3d_core.report.measurement import Bench
 from dap3d_core.report.reference import final_position_error, first_parting, trajectory_error
 from dap3d_core.report.report import front, recommend
 from dap3d_core.report.settings_ladder import ADAPTIVE, MEASURED, ladder, ladder_of_steps
-from dap3d_core.settings import FIXED_STEP
 
 REQUIRED = {"method", "integrator", "time_s", "error", "energy_error", "constraint_error",
             "steps", "rejected", "rhs", "projections"}  # fmt: skip

@@ -374,16 +374,10 @@ def _add_stop(builder: ModelBuilder, element: Element) -> None:
 
 def _of_plane(builder: ModelBuilder, element: Element) -> tuple[Joint, float, float] | None:
     """The joint of a ball at a plane, the sense of its distance, and that where q = 0."""
-    elements = builder.elements
     fields = {"P_j": f"{GROUND}.O", "a_j": f"{GROUND}.z"} | element.fields
-    i, j = (elements.point(fields[end])[0] for end in ("P_i", "P_j"))
-    found = _joint_along(builder, "prismatic", {i, j}, fields["a_j"])
-    if found is None or elements.vector(fields["a_j"])[0] != j:
+    if builder.elements.vector(fields["a_j"])[0] != builder.elements.point(fields["P_j"])[0]:
         return None
-    joint, along = found
-    axis = along * (elements.bodies[joint.body_i].pose.A @ joint.axes[0])
-    distance = -float(axis @ _between(builder, fields))
-    return builder.placed[joint.name], along * (1.0 if i == joint.body_i else -1.0), distance
+    return _of_slider(builder, Element(element.name, element.type, fields))
 
 
 def _add_rotors(builder: ModelBuilder) -> None:

@@ -160,11 +160,11 @@ def is_given(system: System, c: int) -> bool:
     """True if a contact has a force besides those of its rows, its own or by what presses it."""
     own, under = system.contacts[c, STATE] + NEAR, near_of(system, c)
     mode, states = mode_of(system, c), system.states
-    some = 0
+    some = False  # a trace adds conditions to it
     for k in range(3):
         some |= (mode > _OPEN) & (states[own + k] != 0.0)
         some |= (mode > _OPEN) & (mode < _SLIDING) & (states[under + k] != 0.0)
-    return some != 0
+    return some
 
 
 @compiled_into

@@ -151,11 +151,12 @@ def direction(slip, n, way, still=STILL):
     Of slow slip that in which sliding began has a part, of (still / |u|)^3 soon: slip that turns
     while it is next to nothing would ask for steps as short as that.
     """
-    u, w = across(slip, n), unit(across(way, n))
-    square, still = dot(u, u), still * sqrt(dot(way, way))
-    back = where(dot(u, w) < 0.0, dot(u, w), 0.0)
-    least = where(still > 0.0, still, 1.0)
-    return unit(add(u, scale(least**3 / (least * least + square) - 2.0 * back, w)))
+    u, w = across(slip, n), across(way, n)
+    square, ahead = dot(w, w), dot(u, w)
+    slow = still * still * square + dot(u, u)
+    size = where(square > 0.0, square * slow, 1.0)  # u and its change times that: no division
+    part = still**3 * square * square - where(ahead < 0.0, 2.0 * ahead, 0.0) * slow
+    return unit(add(scale(size, u), scale(part, w)))
 
 
 def sliding(u, n, grain, grip, way):

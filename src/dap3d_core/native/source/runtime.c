@@ -448,9 +448,10 @@ static int let_touch(dap3d_model *m, const double *crossing, int starts)
 static int are_endless(dap3d_model *m)
 {
     double t = real_of(m)[R_t], span = fmax(m->span, fabs(t));
+    int rattles = m->w[CONTACT_INTEGER + CI_freed] > MOST_JAMS;
     m->latest[m->change_count++ % MOST_CHANGES] = t;
     if (m->change_count < MOST_CHANGES
-        || t - m->latest[m->change_count % MOST_CHANGES] > WITHIN * span)
+        || t - m->latest[m->change_count % MOST_CHANGES] > (rattles ? RATTLING : WITHIN) * span)
         return 0;
     m->failure = ENDLESS;
     return 1;

@@ -31,6 +31,8 @@ from dap3d_core.simulation.events.jumps import LOSSLESS, MOST_RECORDS, Jumps, ro
 TOUCHING, TOUCHING_AT_START = 1e-10, 1e-8
 #: Ends of modes within this part of the run: what changes more often comes to no end.
 MOST_CHANGES, WITHIN = 2000, 1e-4
+#: Jams that impulses ended, after which as many changes within this part come to none either.
+MOST_JAMS, RATTLING = 500, 1e-2
 #: So many steps within this part of the run are too many: it would not come to an end.
 MOST_STEPS, SLOW = 10_000, 1e-5
 #: Records of changes from one mode to another.
@@ -71,7 +73,7 @@ class ContactJumps(Jumps):
         #: The next instant has what is kept as decided.
         self.repeats = False
         self._stood = (0, -np.inf)
-        self._latest: deque[tuple[float, str, int]] = deque(maxlen=MOST_CHANGES)
+        self._latest: deque[tuple[float, str]] = deque(maxlen=MOST_CHANGES)
 
     @cached_property
     def arrays(self) -> ContactArrays:
@@ -170,17 +172,18 @@ class ContactJumps(Jumps):
     def _refuse_endless(self, integration: Integration, names: list[str]) -> None:
         """SimulationError where changes of contacts follow each other ever faster."""
         latest, t = self._latest, integration.t
-        latest.append((t, ", ".join(names), self.arrays.freed))
-        passed = t - latest[0][0]
-        if len(latest) < MOST_CHANGES or passed > WITHIN * self._span_of(integration):
+        latest.append((t, ", ".join(names)))
+        passed, jams = t - latest[0][0], self.arrays.freed
+        within = RATTLING if jams > MOST_JAMS else WITHIN
+        if len(latest) < MOST_CHANGES or passed > within * self._span_of(integration):
             return
-        every = sorted({name for _, some, _ in latest for name in some.split(", ")})
+        every = sorted({name for _, some in latest for name in some.split(", ")})
         start = f"the run stopped at t = {t:.9g} s: contacts {', '.join(every)}"
-        if freed := self.arrays.freed - latest[0][2]:
+        if jams > MOST_JAMS:
             raise SimulationError(
-                f"{start} rattle: slip jams again and again, {freed} times within {passed:.2g} s, "
-                "and each time an impulse sets it free and lifts bodies that fall back at once. "
-                "Smaller mu of these contacts, or the law of their slip, ends that"
+                f"{start} rattle: slip jams again and again, {jams} times by now, and each time an "
+                f"impulse ends it and lifts what falls back at once, {MOST_CHANGES} changes within "
+                f"{passed:.2g} s. Smaller mu of these contacts ends that"
             )
         raise SimulationError(
             f"{start} changed {MOST_CHANGES} times within {passed:.2g} s, ever faster. Smaller e "

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from support.internals import KIND, NOISE, Y
 
 from dap3d_core.integrators import TABLEAUS, RungeKutta
-from dap3d_core.integrators.stepping.integration_state import KIND, NOISE, Y
 from dap3d_core.integrators.stepping.output import ATTEMPTS, STALL_WORK, is_stalled
 from dap3d_core.integrators.stepping.rounding import judge_noise
 from dap3d_core.integrators.stepping.vector_ops import scaled_largest
