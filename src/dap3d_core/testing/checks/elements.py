@@ -147,11 +147,3 @@ def grip(subject: SampledType) -> CheckOutcome:
         c.compare(sample, np.where(mu[::2] == 0.0, mu[1::2], 0.0), 0.0, _NONE)
         c.compare(sample, near[:2], near[2:], _JUMPS, tolerance=CONTINUOUS)
     return c.outcome()
-
-
-def resist(subject: SampledType) -> CheckOutcome:
-    """Lengths by which a contact resists rolling and spinning are not negative: none drives."""
-    c = Comparison("resist", subject, "resist", "lengths are not negative")
-    for sample in subject.samples:
-        c.compare(sample, np.minimum(sample.value("resist"), 0.0), 0.0, _DRIVES)
-    return c.outcome()
