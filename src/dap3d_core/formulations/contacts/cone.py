@@ -65,7 +65,7 @@ class Cone(Arrays):
     more: Floats  # (m,) normal impulses of an earlier phase, which widen the discs
     gapless: Floats  # (m,) 1 of friction in three directions, else 0
     ratio: Floats  # (m,) of coefficients along t2 to mu, that along t1
-    under: Integers  # (m,) contact whose normal widens the disc: itself, or that at which it resists
+    under: Integers  # (m,) contact whose normal widens the disc: itself, or where it resists
     K: Floats  # A and b stretched; and firmer, with its derivatives
     q: Floats
     firm: Floats
