@@ -12,7 +12,7 @@ from dap3d_core.interface import (
     vector,
 )
 from dap3d_core.kernels import cross, dot, neg, normals, row, scale, sub
-from dap3d_joints.turning import turned_by
+from dap3d_joints.turning import line_rates, turned_by
 
 interface_version = 1
 
@@ -62,17 +62,17 @@ class Follower(Joint):
 class Curved(Follower, curved=True, along=False):
     """The ratio changes."""
 
+    ground_axes = True  # that the wheel turns against
+
     def prepare(self, bodies):
         n, m = normals(self.a_k)
         return {"n_k": n, "m_k": m, "zero": bodies["k"].to_global(n)}
 
     def J(a_j, a_k, n_k, m_k, zero, ratio, bends):
-        return turning(a_j, a_k, ratio_at(n_k, m_k, zero, ratio, bends)[0])
+        return turning(a_j, a_k, ratio_at(n_k, m_k, zero, ratio, bends))
 
     def gamma(a_j_dot, a_k, a_k_dot, n_k, m_k, zero, w_i, w_j, w_k, ratio, bends):
-        now, slope = ratio_at(n_k, m_k, zero, ratio, bends)
-        rate = dot(a_k, w_k)
-        of_wheel = now * dot(a_k_dot, w_k) + slope * rate * rate
+        of_wheel = curved_gamma(a_k, a_k_dot, n_k, m_k, zero, w_k, ratio, bends)
         return of_wheel - dot(a_j_dot, sub(w_i, w_j))
 
 
@@ -80,14 +80,12 @@ class CurvedSliding(Curved, curved=True, along=True):
     """The ratio changes, and body i slides."""
 
     def J(a_j, a_k, n_k, m_k, zero, ratio, bends, r_i, r_j):
-        return sliding(a_j, a_k, ratio_at(n_k, m_k, zero, ratio, bends)[0], r_i, r_j)
+        return sliding(a_j, a_k, ratio_at(n_k, m_k, zero, ratio, bends), r_i, r_j)
 
     def gamma(a_j, a_j_dot, a_k, a_k_dot, n_k, m_k, zero, r_i, r_j, v_i, v_j, w_j, w_k, ratio,
               bends):  # fmt: skip
-        now, slope = ratio_at(n_k, m_k, zero, ratio, bends)
-        rate = dot(a_k, w_k)
-        slide = sliding_gamma(a_j, a_j_dot, r_i, r_j, v_i, v_j, w_j)
-        return now * dot(a_k_dot, w_k) + slope * rate * rate - slide
+        of_wheel = curved_gamma(a_k, a_k_dot, n_k, m_k, zero, w_k, ratio, bends)
+        return of_wheel - sliding_gamma(a_j, a_j_dot, r_i, r_j, v_i, v_j, w_j)
 
 
 class Sliding(Follower, along=True):
@@ -113,10 +111,17 @@ def sliding(a_j, a_k, ratio, r_i, r_j):
 
 
 def ratio_at(n, m, zero, ratio, bends):
-    """The ratio at the angle of the wheel, and its slope there."""
+    """The ratio at the angle of the wheel."""
     angle, (a, b, c) = turned_by(n, m, zero), bends
-    now = ratio + angle * (a + angle * (b + angle * c))
-    return now, a + angle * (2.0 * b + angle * (3.0 * c))
+    return ratio + angle * (a + angle * (b + angle * c))
+
+
+def curved_gamma(a_k, a_k_dot, n, m, zero, w_k, ratio, bends):
+    """What the part of the wheel gains but by its acceleration."""
+    angle, (a, b, c) = turned_by(n, m, zero), bends
+    slope = a + angle * (2.0 * b + angle * (3.0 * c))
+    now, angle_dot = ratio_at(n, m, zero, ratio, bends), dot(line_rates(zero, a_k)[1], w_k)
+    return now * dot(a_k_dot, w_k) + slope * angle_dot * dot(a_k, w_k)
 
 
 def sliding_gamma(a_j, a_j_dot, r_i, r_j, v_i, v_j, w_j):

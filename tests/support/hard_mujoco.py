@@ -11,6 +11,9 @@ SOLREF = ("geom_solref", "jnt_solref", "eq_solref", "pair_solref", "tendon_solre
 SOLIMP = ("geom_solimp", "jnt_solimp", "eq_solimp", "pair_solimp", "tendon_solimp_lim")
 #: Impedances from which accelerations are extrapolated to rigid ones; MuJoCo has none above.
 IMPEDANCES = (0.9998, 0.9999)
+#: By this the inverse inertias are less by which MuJoCo softens constraints at rest: they are of
+#: bodies alone, and armature and loops leave a thousandth of them.
+HARDER = 1e-3
 #: Distance from its limit at which a joint is held by it, rad and m.
 AT_LIMIT = 1e-9
 #: Gap below which geoms touch and limits hold once they are at rest, m and rad; overlap that is
@@ -64,6 +67,8 @@ class HardOracle(Oracle):
         m.opt.ccd_tolerance, m.opt.ccd_iterations = 1e-12, 200
         self._soften((-1e-9, -1e-9), IMPEDANCES[1])
         self._move_apart()
+        for inverse in (m.body_invweight0, m.dof_invweight0, m.tendon_invweight0):
+            inverse *= HARDER
         for impedance in IMPEDANCES:
             self._soften((-1e-9, -1e-9), impedance)
             mujoco.mj_forward(m, d)

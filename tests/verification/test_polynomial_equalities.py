@@ -50,7 +50,7 @@ def test_motion(tmp_path, q):
 
 
 def test_export(tmp_path):
-    """The curve goes back to MJCF, counted from the pose of the scene, and to URDF with a remark."""
+    """The curve goes back to MJCF, counted from the scene's pose, and to URDF with a remark."""
     scene, _ = dap.import_model(written(tmp_path / "a.xml"))
     dap.export_model(scene, tmp_path / "b.xml", format="mjcf")
     text = (tmp_path / "b.xml").read_text()

@@ -1,13 +1,17 @@
 """What resists rolling and spinning, beside closed forms of a solid ball.
 
 Accelerations are constant, which steps follow to rounding; only where motion ends within a step is
-it off, by a part of a h^2.
+it off, by a part of a h^2. Events locate where it ends.
 """
 
 import numpy as np
 import pytest
+from support.own_types import registry_of
 
 import dap3d_core as dap
+from dap3d_core.interface import Contact, Point, Vector, number, point, vector
+from dap3d_core.kernels import dot, scale, sub
+from dap3d_core.testing import check_type
 
 G, R, M = 9.81, 0.1, 2.0
 I = 0.4 * M * R * R
@@ -64,11 +68,93 @@ def test_a_ball_that_spins_stops_in_its_time(declared):
     assert result.w[:, 0, 2] == pytest.approx(np.maximum(w - a * result.t, 0.0), abs=1e-11)
 
 
-def test_events_refuse_what_steps_alone_can_follow():
-    scene = ball(True, mu_roll=0.01)
-    with pytest.raises(dap.SceneError, match="resists rolling or spinning is followed by stepping"):
-        dap.simulate(scene, t_end=0.1, contact="events")
-    assert any("resist rolling" in note for note in dap.simulate(scene, t_end=0.01).notes)
+def by_events(scene, t_end, **settings):
+    """A run whose instants are located."""
+    tight = {"rtol": 1e-11, "atol": 1e-13, "dt": 0.1, "contact": "events"}
+    return dap.simulate(scene, t_end=t_end, **(tight | settings))
+
+
+def instants(result, name):
+    """Where one sticks, by its name."""
+    return [event.t for event in result.events if (event.kind, event.name) == ("stick", name)]
+
+
+@pytest.mark.parametrize("settings", [{}, {"method": "joint"}, {"integrator": "radau"}])
+def test_events_locate_where_a_ball_stops_that_slides_at_first(settings):
+    """It slides by mu g, turned by (mu R - mu_roll) g, until it rolls; that ends at rest."""
+    v, mu, mu_roll = 2.0, 0.8, 0.01
+    scene = ball(True, v=v, mu_roll=mu_roll)
+    name = next(iter(scene.contacts))
+    turning = R * (mu * R - mu_roll) * G * M / I
+    rolls = v / (mu * G + turning)
+    a = G * mu_roll / (ROLLS * R)
+    speed = v - mu * G * rolls
+    result = by_events(scene, 3.0, **settings)
+    assert instants(result, name) == pytest.approx([rolls], abs=1e-9)
+    assert instants(result, f"{name}_roll") == pytest.approx([rolls + speed / a], abs=1e-9)
+    x = v * rolls - 0.5 * mu * G * rolls**2 + 0.5 * speed**2 / a
+    assert result.r[-1, 0, 0] == pytest.approx(x, abs=1e-9)
+    assert np.abs(result.rd[-1]).max() < 1e-15
+    assert result.ledger["energy"].ok
+
+
+@pytest.mark.parametrize("part", [0.999, 1.001])
+def test_events_hold_a_ball_up_to_the_limit_of_a_slope(part):
+    mu_roll = 0.003
+    angle = np.arctan(part * mu_roll / R)
+    result = by_events(ball(True, angle, mu_roll=mu_roll), 10.0)
+    a = max(G * np.sin(angle) - G * np.cos(angle) * mu_roll / R, 0.0) / ROLLS
+    assert result.r[:, 0, 0] == pytest.approx(0.5 * a * result.t**2, abs=1e-13)
+
+
+def test_events_locate_where_a_ball_ends_to_spin_while_it_rolls_on():
+    mu_spin, w, v = 0.002, 20.0, 1.0
+    scene = ball(True, v=v, w=[0.0, v / R, w], mu_spin=mu_spin, mu_roll=0.001)
+    name = next(iter(scene.contacts))
+    result = by_events(scene, 6.0)
+    assert instants(result, f"{name}_spin") == pytest.approx([w * I / (mu_spin * M * G)], abs=1e-9)
+    a = G * 0.001 / (ROLLS * R)
+    assert result.r[-1, 0, 0] == pytest.approx(6.0 * v - 18.0 * a, abs=1e-9)
+
+
+class Wheel(Contact):
+    """A ball that resists rolling by a part of its radius."""
+
+    keyword = "test-wheel"
+    P_i: Point = point()
+    P_j: Point = point("ground.O")
+    a_j: Vector = vector("ground.z")
+    radius: float = number(unit="m")
+    part_lost: float = number(0.02)
+
+    def gap(r_P_i, r_P_j, a_j, radius):
+        return dot(a_j, sub(r_P_i, r_P_j)) - radius
+
+    def at(r_P_i, a_j, radius):
+        return sub(r_P_i, scale(radius, a_j))
+
+    def normal(a_j):
+        return a_j
+
+    def resist(radius, part_lost):
+        return part_lost * radius, 0.0
+
+
+@pytest.mark.parametrize(("contact", "limit"), [("events", 1e-9), ("stepping", 1e-6)])
+def test_a_type_of_one_s_own_says_what_resists(contact, limit):
+    """Of steps of 2 ms the last is off by a part of a h^2 / 2, 3e-7 m."""
+    v, a = 1.0, G * 0.02 / ROLLS
+    scene = dap.Scene(name="wheel")
+    scene.add_body("wheel", mass=M, Jp=[I] * 3, r=[0, 0, R], r_dot=[v, 0, 0], w=[0, v / R, 0])
+    scene.add_contact("test-wheel", "c", P_i="wheel.O", radius=R, mu=0.8)
+    scene.add_force("weight", "gravity", gravity=G)
+    compiled = dap.compile(scene, registry=registry_of(Wheel))
+    result = dap.simulate(compiled, t_end=8.0, dt=0.1, contact=contact, contact_step=2e-3)
+    assert result.r[-1, 0, 0] == pytest.approx(0.5 * v**2 / a, abs=limit)
+
+
+def test_check_plugin_takes_it():
+    assert check_type(Wheel).ok
 
 
 def test_of_pairs_that_are_not_named_the_mean_counts_and_the_pair_where_it_is():

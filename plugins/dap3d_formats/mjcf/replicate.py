@@ -62,7 +62,6 @@ class _Replicator:
             pose = pose @ step
         return copies
 
-
     def _count(self, copies: int, element: XmlElement) -> None:
         self.made += copies * _size(element)
         if self.made > MOST_COPIES:

@@ -162,7 +162,7 @@ def _contacts_of(
         type_: Any = group.type_info.type
         rows[:, equations.LOADED] = type_.along is not None and not type_.load
         rows[:, equations.UNDER] = group.members - first
-        if type_.resists:
+        if group.loaded is not None and type_.resists:
             rows[:, equations.UNDER] = group.loaded - first
         elif group.loaded is not None:
             joints = plan.joint_row[group.loaded]

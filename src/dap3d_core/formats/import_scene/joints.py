@@ -181,7 +181,7 @@ def follow(
     builder: SceneBuilder, joint: Joint, wheel: str, ratios: Sequence[float], suffix: str
 ) -> None:
     """Couple the coordinate of a joint with a wheel; the ratio is a polynomial of its angle."""
-    ratio, *bends = (*map(float, ratios), 0.0, 0.0, 0.0)[:4]
+    ratio, *bends = (*ratios, 0.0, 0.0, 0.0)[:4]
     curve: dict[str, Any] = {"curved": True, "bends": tuple(bends)} if any(bends) else {}
     ends = named_ends(builder, from_ground(builder, joint))
     name = builder.names.free("joints", f"{ends.name}_{suffix}")

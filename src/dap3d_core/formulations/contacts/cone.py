@@ -65,8 +65,8 @@ class Cone(Arrays):
     more: Floats  # (m,) normal impulses of an earlier phase, which widen the discs
     gapless: Floats  # (m,) 1 of friction in three directions, else 0
     ratio: Floats  # (m,) of coefficients along t2 to mu, that along t1
-    under: Integers  # (m,) the contact whose normal widens the disc: itself, or of what resists
-    K: Floats  # rolling the one at which it does. A and b stretched; and firmer, with its derivatives
+    under: Integers  # (m,) contact whose normal widens the disc: itself, or where it resists
+    K: Floats  # A and b stretched; and firmer, with its derivatives
     q: Floats
     firm: Floats
     moved: Floats

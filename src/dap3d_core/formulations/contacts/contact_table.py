@@ -76,7 +76,7 @@ class ContactTable:
             type_: Any = group.type_info.type
             self.turns[which], self.alone[which] = type_.at is None, type_.is_friction_alone()
             self.holds[which] = type_.holds
-            if type_.resists:
+            if group.loaded is not None and type_.resists:
                 self.under[which] = group.loaded - first
             elif group.loaded is not None:
                 starts = model.joint_start[group.loaded][:, None] + type_.load

@@ -64,16 +64,15 @@ from dap3d_core.linear.inverse import invert
 PART, SMALLER, LEAST = 1e-4, 1e-3, 1e-12
 PART_OF_INDEPENDENT, LEAST_PIVOT = 1e-16, 1e-1
 #: Passes at most; each is to leave this part of the one before. They end where they change
-#: multipliers by this part, as the next would by a compliance of that, or where they change them
-#: by rounding alone, which rows that depend on each other enlarge. Where some slide it is a part of
-#: shares as well; what sticks is not to creep, not even by rounding of its share.
+#: multipliers by this part, as the next would by a compliance of that, or by rounding alone, which
+#: rows that depend on each other enlarge. Of shares, too, where some slide: what sticks is not to
+#: creep by their rounding.
 PASSES, FALLING, SETTLED, NOISE = 12, 0.1, 1e-12, 1e-9
 #: A projection that leaves this many times the tolerance, which rounding does not, goes on.
 REACHED = 1e3
 #: Columns of ``System.contacts``: of each point its loop and where its integers and numbers begin,
-#: its first row, its bodies, its first state; 1 of friction that is the same under any load; of
-#: friction of a joint the first row of its load, how many they are, 1 where that pushes alone; the
-#: contact whose normal force presses, as a rule itself, or that at which it resists rolling.
+#: its first row, bodies, first state; 1 of friction that is the same under any load; of friction of
+#: a joint the first row of its load, their number, 1 where that pushes alone; what presses it.
 LOOP, INTEGERS, NUMBERS, ROW, BODY_I, BODY_J, STATE = range(7)
 LOADED, LOAD, LOADS, PUSHES, UNDER, COLUMNS = range(7, 13)
 #: Passes of Newton's method for loads, and the part that the last one changes.
@@ -89,8 +88,7 @@ _OPEN, _SLIDING = 0.5, 1.5
 def memory_size(bodies: int, rows: int, contacts: int) -> int:
     """Numbers of ``System.friction`` (bodies: with ground).
 
-    Applied forces; forces of one contact; of each contact that slides a ``column``; equations of
-    their normal forces, and what solves them.
+    Applied forces; forces of one contact; of each that slides a ``column`` and an equation.
     """
     return 12 * bodies + contacts * (6 * bodies + rows + POWER + 2 * contacts + 2)
 
@@ -263,7 +261,7 @@ def invert_responses(system: System, count: int) -> None:
         return
     A, size = inverse(system, count), system.acceleration.shape[0]
     for r in range(count):
-        place = row_of(system, r)
+        place = pressed_row(system, contact_of(system, r))
         for s in range(count):
             A[2 * count * r + s] = column(system, s)[size + place] + (1.0 if r == s else 0.0)
             A[2 * count * r + count + s] = 1.0 if r == s else 0.0
@@ -278,18 +276,12 @@ def contact_of(system: System, c: int) -> int:
 
 
 @compiled_into
-def row_of(system: System, c: int) -> int:
-    """The normal row that presses contact c of those that slide."""
-    return int(system.contacts[system.contacts[contact_of(system, c), UNDER], ROW])
-
-
-@compiled_into
 def has_loads(system: System, count: int) -> bool:
     """True if friction of a joint is among what slides."""
-    found = 0
+    found = False
     for c in range(count):
         found |= system.contacts[contact_of(system, c), LOADS] > 0
-    return found != 0
+    return found
 
 
 @compiled_into
@@ -324,7 +316,8 @@ def pressing(system: System, count: int) -> Floats:
         for r in range(count):
             N[r] = 0.0
             for s in range(count):
-                N[r] -= A[2 * count * r + count + s] * x[row_of(system, s)]
+                place = pressed_row(system, contact_of(system, s))
+                N[r] -= A[2 * count * r + count + s] * x[place]
     return N
 
 
@@ -372,7 +365,7 @@ def fill_load(system: System, count: int, r: int, A: Floats) -> float:
     for s in range(count):
         A[s] = A[count + s] = 1.0 if r == s else 0.0
     if loads == 0:  # a normal force, of a pass
-        row = row_of(system, r)
+        row = pressed_row(system, c)
         rest = -x[row] - N[r]
         for s in range(count):
             slope = column(system, s)[size + row]

@@ -140,7 +140,7 @@ def needs(
     found = {"u": u, "load": ["lam_load"], "axes": axis, "axes_dot": rates, "ahead": ahead,
              "toward": [*axis, "way"]}  # fmt: skip
     if how in RESISTED:
-        found |= dict.fromkeys(("mu", "mu_s"), list(wanted["resist"]))
+        found["mu"] = found["mu_s"] = list(wanted["resist"])
         found["load"] = ["lam_load", "near_load", *axis]
     return found
 

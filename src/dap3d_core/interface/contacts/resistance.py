@@ -21,7 +21,6 @@ def resist(mu_roll, mu_spin):  # type: ignore[no-untyped-def]
 @cache
 def resisting_type(contact: Any, how: str) -> Any:
     """The type of what resists at a type of contact; how: "roll" or "spin"."""
-
     body: dict[str, Any] = dict.fromkeys(_UNUSED)
     body |= {
         "__module__": contact.__module__,

@@ -96,8 +96,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     for kernel_name in kernels:
         if kernel_name not in JUMP_KINDS:  # they take rows that may be derived
             call(kernel_name)
-    lacking = missing(type_, outputs.get("value") == ("out",))
-    if lacking:
+    if lacking := missing(type_, outputs.get("value") == ("out",)):
         try:
             kernels |= derive(type_, layout, names, lacking)
         except CannotDeriveError as error:
@@ -109,10 +108,8 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     outputs |= _bounds(type_)
     _check_jumps(type_, outputs, len(layout.slots))
     functions = tuple(n for n, s in specs_of(type_).items() if s.kind == "function" and s.argument)
-    friction = _joint_of_friction(type_)
-    return TypeInfo(
-        type_, layout, names, outputs, kernels, variants, functions, friction, derived=derived
-    )
+    return TypeInfo(type_, layout, names, outputs, kernels, variants, functions,
+                    _joint_of_friction(type_), derived=derived)  # fmt: skip
 
 
 def _bounds(type_: type[TypeBase]) -> dict[str, tuple[str, ...]]:
@@ -477,11 +474,11 @@ def _expected(
     if kernel == "J" and type_.kind == "force":
         count = max(1, size(checked_shape(value)) // (6 * slots))
         return (slots, count, 6), f"a block of rows x 6 for each of {slots} bodies"
+    if kernel == "resist":
+        return (2,), "2 numbers, lengths of rolling and of spinning"
     if kernel in ("switch", "tension", "grip"):
         shape = (len(value),) if isinstance(value, tuple) and value else ()
         return shape, "one number, or a tuple of numbers"
-    if kernel == "resist":
-        return (2,), "2 numbers, lengths of rolling and of spinning"
     if kernel in ("wrench", "friction"):
         return (slots, 2, 3), f"(force, moment) for each of {slots} bodies"
     if issubclass(type_, Function):

@@ -245,13 +245,13 @@ class Coupling:
         """The coupling with the ratio and offset of its tangent at a coordinate of the other."""
         if not self.curve:
             return self
-        slope = float(self.slopes(q)[0])
+        slope = self.slopes(q)[0]
         return attrs.evolve(self, ratio=slope, offset=self.at(q) - slope * q)
 
-    def slopes(self, q: float) -> "Floats":
+    def slopes(self, q: float) -> tuple[float, ...]:
         """Coefficients of the ratio as a polynomial of what the other moves on from q."""
         powers = np.polynomial.Polynomial(self.curve or (self.offset, self.ratio))
-        return np.asarray(powers(np.polynomial.Polynomial([q, 1.0])).deriv().coef)
+        return tuple(powers(np.polynomial.Polynomial([q, 1.0])).deriv().coef.tolist())
 
 
 @attrs.frozen(eq=False)

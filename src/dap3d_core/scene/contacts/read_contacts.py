@@ -248,6 +248,8 @@ def _coefficient(report: Collector, key: Key, value: Any) -> float | None:
 
 #: Stands for fields of a type that is not known.
 _ANY = FieldSpec("number", None)
+#: Coefficients that laws of a type may leave unread.
+_UNREAD = dict.fromkeys(("mu", "mu_s", "mu_roll", "mu_spin"), 0.0)
 
 
 def read_contacts(
@@ -266,7 +268,7 @@ def read_contacts(
     for one in read_elements(report, geometry, "contacts", types, functions, elements):
         count: int = one.type_info.type.points  # type: ignore[attr-defined]
         smooth = one.type_info.type.is_smooth  # type: ignore[attr-defined]
-        given = {"mu": 0.0, "mu_s": 0.0} | one.values | (SMOOTH if smooth else {}) | HIDDEN
+        given = _UNREAD | one.values | (SMOOTH if smooth else {}) | HIDDEN
         if given["touch"] and count > 1:
             what = f"cannot be: a {one.type_info.type.keyword} may touch at {count} points"
             remedy = "place its bodies so that they touch, or add a contact of the point that does"

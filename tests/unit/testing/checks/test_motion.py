@@ -55,7 +55,7 @@ INSTALLED = {
     "belt": ["refused: it joins three bodies"],
     "cable": ["refused: it joins three bodies"] * 4 + [ON_TIME] * 2,  # two lists each
     "tendon": ["refused: it joins three bodies"] * 2,
-    "follow": ["refused: it joins three bodies"] * 2,
+    "follow": ["refused: it joins three bodies"] * 4,
     "point-on-plane": [ONE_ROW],
     "point-on-surface": [ONE_ROW],
 }

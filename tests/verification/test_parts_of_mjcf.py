@@ -17,7 +17,8 @@ def test_a_later_option_keeps_gravity(tmp_path):
     assert scene.forces["gravity"].fields["gravity"] == 1.6
 
 
-BALLS = """<worldbody><site name="top" pos="0 0 2"/><site name="low" pos="0 0 1"/><replicate count="3" offset="1 0 0">
+BALLS = """<worldbody><site name="top" pos="0 0 2"/><site name="low" pos="0 0 1"/>
+<replicate count="3" offset="1 0 0">
 <body name="ball"><joint name="x" type="slide" axis="1 0 0"/><geom size="0.1"/>
 <site name="end"/></body></replicate></worldbody>
 <tendon><spatial name="rope" stiffness="3"><site site="top"/><site site="end"/></spatial>
