@@ -57,8 +57,9 @@ class ContactArrays(Arrays):
         **dict.fromkeys(
             ("integer", "newton", "alone", "under", "load_row", "load_count", "load_pushes",
              "touching", "closed", "group", "kept", "mine", "begins", "leaves", "gone", "slides",
-             "slipping", "jams", "order", "rows", "before", "along_with", "state", "frame_body", "model_row",
-             "in_touch", "stops", "opening", "is_low", "rests_soon", "role", "is_active", "active"),
+             "slipping", "jams", "order", "rows", "before", "along_with", "state", "frame_body",
+             "model_row", "in_touch", "stops", "opening", "is_low", "rests_soon", "role",
+             "is_active", "active"),
             INTEGERS,
         ),
         **dict.fromkeys(("holds", "feels", "switches", "ended", "taking"), INTEGER_MATRIX),
