@@ -1,4 +1,4 @@
-"""Bounces with friction that give back no more energy than they take.
+"""What collides; bounces with friction that give back no more energy than they take.
 
 Newton's law with friction may gain energy (Kane, Levinson, Dynamics: theory and applications, 1985,
 sec. 5.8). Where it would, impulses are a mean of these and of those without a bounce: cones are
@@ -10,7 +10,7 @@ convex, and without a bounce nothing is gained.
 
 import math
 
-from dap3d_core.integrators.moreau.arrays import BOUNCES, StepArrays
+from dap3d_core.integrators.moreau.arrays import BOUNCES, CONE, STOPS, StepArrays
 from dap3d_core.integrators.moreau.contact_set import velocity_of
 from dap3d_core.integrators.moreau.gauss_seidel import copy_impulses
 from dap3d_core.integrators.moreau.matrix import find_groups, root_of
@@ -23,6 +23,44 @@ from dap3d_core.kernels.runtime.cache import compiled
 WITH, HALF, WITHOUT, EXCHANGED, KEPT = range(5)
 #: Work that is rounding, as a part of what is exchanged.
 GAIN_ROUNDING = 1e-12
+#: Gaps, m of a scene of ordinary size, below which overlaps are left.
+OVERLAP = 1e-12
+#: A contact collides where it approaches by more than this times h times the acceleration.
+COLLIDES = 4.0
+
+
+@compiled
+def put_bias(s: StepArrays) -> bool:
+    """What is added to normal velocities; True if bodies collide."""
+    fall, found = 0.0, False
+    for b in range(s.free.shape[0]):
+        for k in range(3):
+            fall = max(fall, abs(s.free[b, k] - s.before[b, k]))
+    for c in range(s.contact_count):
+        bias, s.collides[c] = s.bias[c], 0
+        bias[0] = bias[1] = bias[2] = 0.0
+        if s.gap[c] > OVERLAP * s.length:  # redundant contacts would disagree by less
+            bias[0] = s.gap[c] / s.h
+        if s.kind[c] != CONE:
+            continue
+        approach, _, _ = velocity_of(s, c, s.before)
+        normal, _, _ = velocity_of(s, c, s.free)
+        change = max(fall, abs(normal - approach))  # by turning, too
+        if approach < -COLLIDES * change and s.gap[c] + s.h * min(approach, normal) < 0.0:
+            s.collides[c], found = STOPS, True
+            s.closing[c] = closing_of(max(s.gap[c], 0.0), s.h * approach, s.h * (normal - approach))
+            last = 1.0 - s.closing[c]
+            back = last * (normal - approach) - s.e[c] * (normal - last * (normal - approach))
+            if s.e[c] > 0.0 and back > 0.0:
+                s.collides[c], bias[0] = BOUNCES, -back
+    return found
+
+
+@compiled
+def closing_of(gap: float, way: float, more: float) -> float:
+    """The part x of a step in which a gap closes: gap + x (way + x more / 2) = 0."""
+    inner = way * way - 2.0 * gap * more
+    return min(1.0, 2.0 * gap / (math.sqrt(max(inner, 0.0)) - way))
 
 
 @compiled

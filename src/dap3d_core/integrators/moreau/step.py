@@ -36,7 +36,7 @@ from dap3d_core.integrators.moreau.impulses import (
 from dap3d_core.integrators.moreau.matrix import find_groups, root_of
 from dap3d_core.integrators.moreau.newton import product_of, speed_of
 from dap3d_core.integrators.moreau.problem import NEAR, prepare_problem, solve
-from dap3d_core.integrators.moreau.restitution import limit_bounces
+from dap3d_core.integrators.moreau.restitution import OVERLAP, limit_bounces, put_bias
 from dap3d_core.integrators.stepping.integration_state import (
     NO_ROOM,
     NOT_FINITE,
@@ -52,10 +52,8 @@ from dap3d_core.interface.contacts.rows import FAR_APART
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
-#: Gaps, m of a scene of ordinary size, below which overlaps are left; passes that remove them.
-OVERLAP, PASSES = 1e-12, 8
-#: A contact collides where it approaches by more than this times h times the acceleration.
-COLLIDES = 4.0
+#: Passes that remove overlaps.
+PASSES = 8
 #: Part of the step where bodies are not hit.
 NOT_HIT = 2.0
 #: Parts of a step by which times differ that are meant to be one.
@@ -193,7 +191,9 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     if s.declared_law.size > 0:
         find_grips(work.t, s, system, loops)
     order_memory(work.memory, s.slots)
-    if stay_closed(work, s) and not turn_rows(work.t + 0.5 * s.h, put_middle(work, s), s, system, loops):
+    if stay_closed(work, s) and not turn_rows(
+        work.t + 0.5 * s.h, put_middle(work, s), s, system, loops
+    ):
         return False
     for c in range(s.touch_count if s.resistance_count > 0 else 0):
         put_resistances(c, s)
@@ -293,33 +293,6 @@ def deepest_of(s: StepArrays) -> float:
 
 
 @compiled
-def put_bias(s: StepArrays) -> bool:
-    """What is added to normal velocities; True if bodies collide."""
-    fall, found = 0.0, False
-    for b in range(s.free.shape[0]):
-        for k in range(3):
-            fall = max(fall, abs(s.free[b, k] - s.before[b, k]))
-    for c in range(s.contact_count):
-        bias, s.collides[c] = s.bias[c], 0
-        bias[0] = bias[1] = bias[2] = 0.0
-        if s.gap[c] > OVERLAP * s.length:  # redundant contacts would disagree by less
-            bias[0] = s.gap[c] / s.h
-        if s.kind[c] != CONE:
-            continue
-        approach, _, _ = velocity_of(s, c, s.before)
-        normal, _, _ = velocity_of(s, c, s.free)
-        change = max(fall, abs(normal - approach))  # by turning, too
-        if approach < -COLLIDES * change and s.gap[c] + s.h * min(approach, normal) < 0.0:
-            s.collides[c], found = STOPS, True
-            s.closing[c] = closing_of(max(s.gap[c], 0.0), s.h * approach, s.h * (normal - approach))
-            last = 1.0 - s.closing[c]
-            back = last * (normal - approach) - s.e[c] * (normal - last * (normal - approach))
-            if s.e[c] > 0.0 and back > 0.0:
-                s.collides[c], bias[0] = BOUNCES, -back
-    return found
-
-
-@compiled
 def stay_closed(work: Any, s: StepArrays) -> bool:
     """Mark the contacts that stay closed and move, by velocities ``end`` expected; True if any."""
     found, least = False, OVERLAP * s.length
@@ -361,13 +334,6 @@ def put_middle(work: Any, s: StepArrays) -> Floats:
     for b in range(1, s.end.shape[0]):
         normalise(middle, coordinate_offset(b) + 3)
     return middle
-
-
-@compiled
-def closing_of(gap: float, way: float, more: float) -> float:
-    """The part x of a step in which a gap closes: gap + x (way + x more / 2) = 0."""
-    inner = way * way - 2.0 * gap * more
-    return min(1.0, 2.0 * gap / (math.sqrt(max(inner, 0.0)) - way))
 
 
 @compiled
