@@ -86,7 +86,7 @@ class StepArrays(Arrays):
     contact_count = _integer()
     touch_count = _integer()  # the first ones, of shapes
     law_count = _integer()  # with those declared; behind them what resists their rolling
-    stage = _integer()  # of a step that waits for room: 0, or FREE, MOVED or START (step.py)
+    stage = _integer()  # of a step that waits for room: 0, or FREE or MOVED (step.py)
     is_solved = _integer()  # 1: there were contacts in the last step
     met_count = _integer()
     log_count = _integer()

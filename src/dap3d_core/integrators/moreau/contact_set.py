@@ -97,6 +97,8 @@ def turn_rows(t: float, y: Floats, s: StepArrays, system: System, loops: Any) ->
         if c >= first:
             if s.kind[c] != CONE or s.collides[c] == STAYS:
                 put_rows(c, s, system)
+                for i in range(12, 36 if s.under[c] >= 0 else 12):  # as in find_grips
+                    s.J[c, i] *= s.grip[s.key[c] - DECLARED]
         elif s.collides[c] == STAYS:
             i, j = shapes.which[c, 0], shapes.which[c, 1]
             if last == first or shapes.which[first, 0] != i or shapes.which[first, 1] != j:

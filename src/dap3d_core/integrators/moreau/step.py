@@ -52,6 +52,9 @@ from dap3d_core.interface.contacts.rows import FAR_APART
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
+#: Way within a step, as a part of the scene's length, below which rows turn by next to nothing: as
+#: of piles at rest, whose speeds are those that their residual leaves.
+TURNING = 1e-6
 #: Passes that remove overlaps.
 PASSES = 8
 #: Part of the step where bodies are not hit.
@@ -65,8 +68,8 @@ RENEWED, FOLLOWED, MOST_STEPS = 3, 2.0, 100
 #: Margin of contacts, as parts of the way of a step, and m of a scene of ordinary size.
 MARGIN, LEAST_MARGIN = 1.2, 1e-6
 #: Stages of a step that waits for room: the trial state is that without contacts; it is that where
-#: bodies have moved to, but may overlap; it is looked for what contacts push with at the start.
-FREE, MOVED, START = 1, 2, 3
+#: bodies have moved to, but may overlap.
+FREE, MOVED = 1, 2
 
 
 @compiled
@@ -78,10 +81,6 @@ def advance(
     Or room is missing: ``stage`` says so.
     """
     limit = work.rhs_count + budget
-    if is_at_start(work, s):
-        s.stage = 0 if push_at_start(work, s, functions[0], system, loops) else START
-        if s.stage == START:
-            return
     while s.stage != 0 or goes_on(work, s, functions, system, loops, limit):
         if s.stage == 0:
             if work.step_count % RENEWED == 0:
@@ -105,25 +104,6 @@ def advance(
         finish(work, s, functions, system, loops)
     if s.stage != 0 and s.is_exported != 0:
         work.t_stop, work.status, s.stage = s.t1, NO_ROOM, 0
-
-
-@compiled
-def is_at_start(work: Any, s: StepArrays) -> bool:
-    """True until it is known what contacts push with before the first step."""
-    begins, knows = work.step_count + work.next_report == 0, work.memory[0, 0] >= 0.0
-    return begins and (s.stage == START or (s.stage == 0 and not knows))
-
-
-@compiled
-def push_at_start(work: Any, s: StepArrays, rhs: Any, system: System, loops: Any) -> bool:
-    """Find what contacts push with in a first step that is not taken; False without room."""
-    if s.stage == 0:
-        work.rate = largest_rate(work, s, rhs, system, loops)
-        s.h = work.fixed_step
-        move_freely(work, s, rhs, system, loops)
-    if not all_finite(work.state[TRIAL]):
-        return True
-    return meet(work, s, system, loops)
 
 
 @compiled
@@ -295,7 +275,7 @@ def deepest_of(s: StepArrays) -> float:
 @compiled
 def stay_closed(work: Any, s: StepArrays) -> bool:
     """Mark the contacts that stay closed and move, by velocities ``end`` expected; True if any."""
-    found, least = False, OVERLAP * s.length
+    found, least = False, TURNING * s.length
     for b in range(1, s.end.shape[0]):
         for k in range(6):
             s.end[b, k] = s.free[b, k] + s.h * work.pushed[b, k]
