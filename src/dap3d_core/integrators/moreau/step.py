@@ -96,7 +96,7 @@ def advance(
             if not meet(work, s, system, loops):
                 break
             if s.is_solved != 0:
-                go(work, s)
+                carry_on(work, s)
             s.stage = MOVED
         if s.is_solved != 0 and not part(work, s, system, loops):
             break
@@ -197,7 +197,7 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
 
 
 @compiled
-def go(work: Any, s: StepArrays) -> None:
+def carry_on(work: Any, s: StepArrays) -> None:
     """Move the bodies by what contacts give them, as the trial state."""
     y, trial = work.state[Y], work.state[TRIAL]
     for b in range(1, s.end.shape[0]):
