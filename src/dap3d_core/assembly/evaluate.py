@@ -132,7 +132,8 @@ def scale_forces(body: Floats, metric: Floats, force: Floats, out: Floats) -> fl
         f0, f1, f2 = force[o], force[o + 1], force[o + 2]
         n0, n1, n2 = force[o + 3], force[o + 4], force[o + 5]
         power += f0 * s[12] + f1 * s[13] + f2 * s[14] + n0 * s[15] + n1 * s[16] + n2 * s[17]
-        g0, g1, g2 = gyroscopic_moment(s, k[16], k[17], k[18])
+        J = s[23], s[24], s[25], s[27], s[28], s[31]
+        g0, g1, g2 = gyroscopic_moment(J, (k[16], k[17], k[18]))
         out[o], out[o + 1], out[o + 2] = f0 * k[0], f1 * k[0], f2 * k[0]
         g0, g1, g2 = scaled_moment(k, g0, g1, g2)
         out[o + 3] = k[7] * n0 + k[10] * n1 + k[13] * n2 - g0

@@ -27,16 +27,17 @@ def in_body_axes(s: Floats, x: float, y: float, z: float) -> tuple[float, float,
 
 
 @compiled_into
-def gyroscopic_moment(s: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """The moment w' x J' w' of an angular velocity w' = (x, y, z), all in body axes.
+def gyroscopic_moment(J: Any, w: Any) -> tuple[float, float, float]:
+    """The moment w' x J' w' of an angular velocity w', all in body axes; J: xx, xy, xz, yy, yz, zz.
 
     By differences of the moments of inertia: of a sphere it is zero to the last digit.
     """
-    j01, j02, j12 = s[24], s[25], s[28]
+    x, y, z = w
+    j00, j01, j02, j11, j12, j22 = J
     return (
-        (s[31] - s[27]) * (y * z) + j12 * (y * y - z * z) + x * (j02 * y - j01 * z),
-        (s[23] - s[31]) * (z * x) + j02 * (z * z - x * x) + y * (j01 * z - j12 * x),
-        (s[27] - s[23]) * (x * y) + j01 * (x * x - y * y) + z * (j12 * x - j02 * y),
+        (j22 - j11) * (y * z) + j12 * (y * y - z * z) + x * (j02 * y - j01 * z),
+        (j00 - j22) * (z * x) + j02 * (z * z - x * x) + y * (j01 * z - j12 * x),
+        (j11 - j00) * (x * y) + j01 * (x * x - y * y) + z * (j12 * x - j02 * y),
     )
 
 

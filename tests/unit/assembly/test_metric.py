@@ -2,23 +2,23 @@
 
 import numpy as np
 import pytest
-from support.internals import BODY_WIDTH, JP, A, P, compiled
+from support.internals import A, P, compiled
 from support.rotations import rotation
 
 from dap3d_core.assembly.metric import gyroscopic_moment, orient_by_state
 
 
 @compiled
-def store_moment(s, w, out):
+def store_moment(J, w, out):
     """``gyroscopic_moment``, which is put into its callers."""
-    out[0], out[1], out[2] = gyroscopic_moment(s, w[0], w[1], w[2])
+    x = J[0], J[1], J[2], J[3], J[4], J[5]
+    out[0], out[1], out[2] = gyroscopic_moment(x, (w[0], w[1], w[2]))
 
 
 def moment(J, w):
     """Of a body with this inertia."""
-    s, out = np.zeros(BODY_WIDTH), np.zeros(3)
-    s[JP : JP + 9] = np.ravel(J)
-    store_moment(s, np.array(w), out)
+    out = np.zeros(3)
+    store_moment(J[np.triu_indices(3)], np.array(w), out)
     return out
 
 

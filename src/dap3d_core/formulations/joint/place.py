@@ -25,6 +25,7 @@ from dap3d_core.formulations.joint.node_layout import (
     LINK,
     LINK_NOW,
     MOTION,
+    OWN_W,
     PARENT,
     PARENT_ROW,
     POINT,
@@ -113,11 +114,11 @@ def place_nodes(y: Floats, system: System) -> None:
             link(b, up, K, k, m, C, c)
         elif motion == SPHERICAL:
             orient_by_state(b, o, (y[i], y[i + 1], y[i + 2], y[i + 3]))
-            w, alpha = times(b, o + A, vector_of(y, j)), (0.0, 0.0, 0.0)
+            w, alpha = turn_freely(vector_of(y, j), b, o, K, k), (0.0, 0.0, 0.0)
             link(b, up, K, k, m, C, c)
         elif motion == FREE:
             orient_by_state(b, o, (y[i + 3], y[i + 4], y[i + 5], y[i + 6]))
-            w, alpha = times(b, o + A, vector_of(y, j + 3)), (0.0, 0.0, 0.0)
+            w, alpha = turn_freely(vector_of(y, j + 3), b, o, K, k), (0.0, 0.0, 0.0)
             put(K, k + POINT, vector_of(y, i))
             put(K, k + VELOCITY, vector_of(y, j))
             put(K, k + ACCELERATION, alpha)
@@ -177,6 +178,13 @@ def revolve(rate: float, b: Floats, up: int, K: Floats, k: int, m: int, C: Float
     put(K, k + AXIS_NOW, axis)
     w, relative_w = vector_of(b, up + W), scale(rate, axis)
     return add(w, relative_w), add(vector_of(K, m + ALPHA), cross(w, relative_w))
+
+
+@compiled_into
+def turn_freely(own: Vector, b: Floats, o: int, K: Floats, k: int) -> Vector:
+    """Angular velocity of a ball or free body, global axes; stores omega', which is given."""
+    put(K, k + OWN_W, own)
+    return times(b, o + A, own)
 
 
 @compiled_into

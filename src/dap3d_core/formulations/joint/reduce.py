@@ -11,10 +11,12 @@ Featherstone, Rigid Body Dynamics Algorithms (2008), 7.2; Jain, Robot and Multib
 from typing import Any
 
 from dap3d_core.assembly.arrays import Floats, System
+from dap3d_core.assembly.metric import gyroscopic_moment
 from dap3d_core.formulations.joint.node_layout import (
     ACCELERATION,
     ALPHA,
     AXIS_NOW,
+    CENTRE,
     CENTRE_NOW,
     CONSTANT_WIDTH,
     FACTORS_BALL,
@@ -37,6 +39,7 @@ from dap3d_core.formulations.joint.node_layout import (
     MATRIX_M,
     MOMENT,
     MOTION,
+    OWN_W,
     PARENT,
     PRISMATIC,
     REVOLUTE,
@@ -44,6 +47,7 @@ from dap3d_core.formulations.joint.node_layout import (
     SPHERICAL,
     SPIN,
     TREE_WIDTH,
+    VELOCITY,
     WORK_WIDTH,
 )
 from dap3d_core.formulations.joint.place import in_node_axes, put, times, vector_of
@@ -80,12 +84,12 @@ def reduce_nodes(system: System, forces: Floats, keeps: bool) -> float:
         motion, flags, row = tree[t + MOTION], tree[t + FLAGS], tree[t + ROW]
         M, H, J, moment, force = NO_INERTIA, NO_MATRIX, NO_INERTIA, NOTHING, NOTHING
         if flags & HAS_MASS != 0:
-            o, f = BODY_WIDTH * row, vector_of(F, 6 * row)
-            couple, w = vector_of(F, 6 * row + 3), vector_of(b, o + W)
-            power += dot(f, vector_of(b, o + V)) + dot(couple, w)
+            o, f, couple = BODY_WIDTH * row, vector_of(F, 6 * row), vector_of(F, 6 * row + 3)
             if flags & IS_ALONE != 0:
-                accelerate_alone(motion, b, o, C, c, K, k, w, f, couple)
+                power += accelerate_alone(motion, b, o, C, c, K, k, f, couple)
                 continue
+            w = vector_of(b, o + W)
+            power += dot(f, vector_of(b, o + V)) + dot(couple, w)
             J = own_inertia(b, o, C, c)
             M, H = own_mass(C[c + MASS], vector_of(K, k + CENTRE_NOW))
             moment, force = missing(J, C[c + MASS], w, K, k, f, couple)
@@ -188,22 +192,30 @@ def missing(J: Symmetric, mass: float, w: Vector, K: Floats, k: int, f: Vector, 
 
 @compiled_into
 def accelerate_alone(
-    motion: int, b: Floats, o: int, C: Floats, c: int, K: Floats, k: int,
-    w: Vector, f: Vector, n: Vector,
-) -> None:  # fmt: skip
-    """Store the rates of a body that is alone: ground does not move, and J' is constant."""
-    J, moment = six_of(C, c + INERTIA), add(n, cross(vector_of(K, k + CENTRE_NOW), f))
+    motion: int, b: Floats, o: int, C: Floats, c: int, K: Floats, k: int, f: Vector, n: Vector
+) -> float:
+    """Store the rates of a body that is alone: ground does not move, and J' is constant.
+
+    Returns the power of its forces, by moments about P: ground has none of it. What only turns is
+    taken in the body's axes, where its velocities and moments of inertia are.
+    """
+    J = six_of(C, c + INERTIA)
     if motion >= SPHERICAL:
-        w = in_node_axes(b, o, w)
-        moment = sub(in_node_axes(b, o, moment), cross(w, symmetric_times(J, w)))
-        put(K, k + MOMENT, solve_factored(factors_of(J), moment))
+        w = vector_of(K, k + OWN_W)
+        moment = cross(vector_of(C, c + CENTRE), in_node_axes(b, o, f))
+        moment = add(in_node_axes(b, o, n), moment)
+        lacking = sub(moment, gyroscopic_moment(J, w))
+        put(K, k + MOMENT, solve_factored(factors_of(J), lacking))
         put(K, k + FORCE, scale(1.0 / C[c + MASS], f))
-    elif motion == REVOLUTE:
+        return dot(moment, w) + dot(f, vector_of(K, k + VELOCITY))
+    if motion == REVOLUTE:
         axis = vector_of(K, k + AXIS_NOW)
         own = in_node_axes(b, o, axis)
-        K[k + FREE_RATE] = dot(axis, moment) / dot(own, symmetric_times(J, own))
+        lack = dot(axis, add(n, cross(vector_of(K, k + CENTRE_NOW), f)))
+        K[k + FREE_RATE] = lack * (1.0 / dot(own, symmetric_times(J, own)))
     elif motion == PRISMATIC:
-        K[k + FREE_RATE] = dot(vector_of(K, k + AXIS_NOW), f) / C[c + MASS]
+        K[k + FREE_RATE] = dot(vector_of(K, k + AXIS_NOW), f) * (1.0 / C[c + MASS])
+    return dot(f, vector_of(b, o + V)) + dot(n, vector_of(b, o + W))
 
 
 @compiled_into

@@ -47,6 +47,8 @@ REPORTS = "-r"
 MOST_INSTRUCTIONS, MOST_OF_REPORT = 22_000, 10_000
 #: Guards of a report at most: where rows depend on each other it decides many ranks.
 MOST_GUARDS = 150
+#: Rates that are stored at once, as sums of stages load them.
+STORED = 4
 ARGUMENTS = "double %t, ptr %y, i64 %y.1, ptr %out, i64 %out.1, ptr %system, ptr %loops"
 
 _PROGRAM = """
@@ -192,7 +194,10 @@ def write_program(
     if k == REPORT and len(tracer.guards) > MOST_GUARDS:
         raise TraceError(f"takes more than {MOST_GUARDS} guards")
     body = tracer.taken_lines()
-    for (base, place), x in zip(found.places, found.numbers, strict=True):
+    together = state.size // STORED * STORED if k == RHS and count == 1 else 0
+    for place in range(0, together, STORED):
+        tracer.store_together("%out", place, found.numbers[place : place + STORED])
+    for (base, place), x in list(zip(found.places, found.numbers, strict=True))[together:]:
         tracer.store(base(), place, x)
     text = _PROGRAM.format(head=head, arguments=ARGUMENTS, body=body, guard=guard,
                            stores=tracer.taken_lines(), **names)  # fmt: skip

@@ -10,7 +10,7 @@ has stored nothing, and calls the function that it stands for. Results have the 
 import ast
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -78,6 +78,18 @@ class StraightLine(Tracer):
         """Store a number at an index of an array."""
         word, at = self.word(x), self.new(f"getelementptr inbounds double, ptr {base}, i64 {k}")
         self.line(f"store double {word}, ptr {at}, align 8")
+
+    def store_together(self, base: str, k: int, numbers: Sequence[Any]) -> None:
+        """Store numbers from an index of an array on, as one vector.
+
+        What loads that vector soon after would wait for numbers that were stored one by one. LLVM
+        parts such a store again unless it is volatile.
+        """
+        vector, word = f"<{len(numbers)} x double>", "poison"
+        for i, x in enumerate(numbers):
+            word = self.new(f"insertelement {vector} {word}, double {self.word(x)}, i64 {i}")
+        at = self.new(f"getelementptr inbounds double, ptr {base}, i64 {k}")
+        self.line(f"store volatile {vector} {word}, ptr {at}, align 8")
 
     def number(self, value: t.Value) -> Any:
         """The number of a value at the state where the program is written."""
