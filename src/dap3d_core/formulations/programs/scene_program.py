@@ -154,7 +154,6 @@ def write_program(
     varied: Varied = None,
     tracer: StraightLine | None = None,
     others: Sequence[Floats] | None = None,
-    count: int = 1,
 ) -> tuple[str, dict[str, str]]:
     """LLVM IR of the program of one function, and the declarations that it needs.
 
@@ -167,13 +166,12 @@ def write_program(
         varied: as of ``constants``.
         tracer: records the program; left out, one of as many instructions as it may have.
         others: of a projection, as of ``merged`` (ways.py).
-        count: as of ``write_programs``.
 
     Raises:
         TraceError: the program would be too long, or have too many guards.
     """
     most = MOST_OF_REPORT if k == REPORT else MOST_INSTRUCTIONS
-    tracer = tracer or StraightLine(most, keeps_factors=count > 1)
+    tracer = tracer or StraightLine(most)
     first = np.array([1.0, *np.zeros(OUTCOMES - 1 + evaluator.length_count)])
 
     def trace(state: Floats) -> tuple[Results, Any]:
@@ -320,7 +318,7 @@ def write_programs(
         of = evaluator, k, time, state, names, head, varied, None
         for ways in (None,) if others is None or k != PROJECT else (others, None):
             try:
-                text, needed = write_program(*of, ways, count)
+                text, needed = write_program(*of, ways)
             except TraceError:
                 if k == RHS:
                     raise

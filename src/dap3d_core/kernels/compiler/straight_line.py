@@ -30,14 +30,13 @@ class StraightLine(Tracer):
         guards: conditions, by their names, and whether each one holds.
     """
 
-    def __init__(self, most: int, *, keeps_factors: bool = False) -> None:
+    def __init__(self, most: int) -> None:
         """Args:
         most: instructions at most.
-        keeps_factors: in their order, in which derivatives of a product are rounded.
         """
         super().__init__()
         self.guards: dict[str, bool] = {}
-        self._most, self._keeps_factors = most, keeps_factors
+        self._most = most
         self._known: dict[str, str] = {}
         self._numbers: dict[str, Any] = {}
 
@@ -147,8 +146,7 @@ class StraightLine(Tracer):
 
     def _instruction(self, kind: type, a: t.Value, b: t.Value) -> t.Value:
         """The instruction of an operation of two floats, and its number at this state."""
-        is_free = kind is ast.Add or (kind is ast.Mult and not self._keeps_factors)
-        if is_free and a.words > b.words:
+        if a.words > b.words and (kind is ast.Add or kind is ast.Mult):
             a, b = b, a
         python, instruction = OF_FLOATS[kind]
         name = self.new(f"{instruction} {a.words[0]}, {b.words[0]}")

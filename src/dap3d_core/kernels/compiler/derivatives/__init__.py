@@ -10,9 +10,8 @@ Code may say what differentiation by instructions does not know (``with_slopes``
 ``is_differentiated``, ``values_alone`` of intrinsics.py): these are lines with a remark.
 
 One, three, seven and fifteen slopes fill a vector with the value (within.py); others are a vector
-of their own, beside it (beside.py). Both products of a product's slopes are added with one rounding
-where the processor has it, which is written here: optimisation neither contracts nor reassociates,
-so bits of slopes do not depend on it, and programs of a scene have those of general code.
+of their own, beside it (beside.py). Slopes are neither contracted nor reassociated: their bits
+depend on no optimisation, and programs of a scene have those of general code.
 
 The text is that of this compiler (writer.py, functions.py, trace.py), one instruction a line.
 Source: A. Griewank, A. Walther, Evaluating Derivatives, 2nd ed., SIAM 2008, chapter 3.
@@ -52,8 +51,6 @@ def differentiate(text: str, count: int) -> str:
         takes = "double, double" if function == "pow" else "double"
         kind = "" if function.startswith("llvm.") else PURE
         lines.append(f"declare double @{function}({takes}){kind}")
-    vector = f"<{lanes} x double>"
-    lines.append(f"declare {vector} @llvm.fmuladd.v{lanes}f64({vector}, {vector}, {vector})")
     return "\n".join([*lines, ""])
 
 

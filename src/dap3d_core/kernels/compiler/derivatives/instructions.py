@@ -62,15 +62,11 @@ class Instructions:
         return self._splats[word]
 
     def total(self, a: str, b: str, factor: str, *, is_negative: bool = False) -> str:
-        """Vector a, zero where that is "", and vector b times a number, or less these.
-
-        With one rounding where the processor has it.
-        """
-        b = self.lanewise("fneg", b) if is_negative else b
-        if not a:
-            return self.lanewise("fmul", b, self.splat(factor))
-        given = ", ".join(f"{self.vector} {x}" for x in (b, self.splat(factor), a))
-        return self.new(f"call {self.vector} @llvm.fmuladd.v{self.lanes}f64({given})")
+        """Vector a, zero where that is "", and vector b times a number, or less these."""
+        part = self.lanewise("fmul", b, self.splat(factor))
+        if a:
+            return self.lanewise("fsub" if is_negative else "fadd", a, part)
+        return self.lanewise("fneg", part) if is_negative else part
 
     def of_function(self, function: str, y: str, values: list[str], slopes: Sequence[str]) -> str:
         """Slopes of a function of the C library, given its value, its arguments and their slopes.

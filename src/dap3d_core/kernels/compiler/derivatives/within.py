@@ -119,10 +119,13 @@ class WithinWriter(VectorWriter, Instructions):
 
     def _quotient(self, a: str, b: str) -> None:
         """(a / b)' = (a' - (a / b) b') / b."""
+        if NUMBER.fullmatch(b):
+            a, b = self._word(a), self.splat(b)
+            self.out.append(f"  {self._name} = fdiv {self.vector} {a}, {b}")
+            return
         divisor = self._value(b)
-        value, rest = self.number("fdiv", self._value(a), divisor), self._word(a)
-        if not NUMBER.fullmatch(b):
-            rest = self.total(rest, b, value, is_negative=True)
+        value = self.number("fdiv", self._value(a), divisor)
+        rest = self.total(self._word(a), b, value, is_negative=True)
         over = self.splat(self.number("fdiv", ONE, divisor))
         self._finish(value, self.lanewise("fmul", rest, over))
 
