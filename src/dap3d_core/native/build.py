@@ -182,11 +182,8 @@ def link(
     pic = [] if target.library == ".dll" else ["-fPIC"]
     _run([*compiler, *OPTIONS, *pic, "-c", str(source), "-o", str(made)])
     math = [] if target.library == ".dll" else ["-lm"]
-    strip = [] if target.library == ".dylib" else ["-s", "-Wl,--gc-sections"]
-    extra = {
-        ".dylib": ["-install_name", f"@rpath/{library.name}"],
-        ".so": ["-Wl,-z,noseparate-code"],
-    }.get(target.library, [])
+    strip = [] if target.library == ".dylib" else ["-s"]
+    extra = {".dylib": ["-install_name", f"@rpath/{library.name}"]}.get(target.library, [])
     everything = [str(made), *map(str, files)]
     _run([*compiler, "-shared", *strip, *extra, *everything, *math, "-o", str(library)])
     for imports in library.parent.glob(f"{source.stem}.lib"):  # as zig calls it
