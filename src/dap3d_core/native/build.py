@@ -5,7 +5,7 @@ import platform
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import attrs
@@ -20,6 +20,8 @@ from dap3d_core.native.run.prepared import refusal
 
 #: Compiler options; nothing is contracted, for the bits of plain arithmetic.
 OPTIONS = ("-std=c11", "-O2", "-ffp-contract=off", "-fvisibility=hidden")
+#: Attributes of functions in LLVM IR that are compiled for size; without loss of bits.
+SMALL = " nounwind minsize optsize"
 #: The compiler for every platform.
 COMPILER = "pip install ziglang"
 
@@ -127,15 +129,17 @@ def _run(command: list[str]) -> None:
         raise refusal(f"the compiler failed: {' | '.join(words[-6:])} [{' '.join(command[:6])}]")
 
 
-def object_of(unit: Unit | PairUnit, target: Platform) -> bytes:
+def object_of(unit: Unit | PairUnit, target: Platform, *, is_small: bool) -> bytes:
     """Object code of a unit for the linker of a platform, from the cache folder if it is there."""
-    folder = cache_folder()
-    path = None if folder is None else folder / f"{unit.name}.{target.name}.o"
+    folder, kind = cache_folder(), ".small" if is_small else ""
+    path = None if folder is None else folder / f"{unit.name}.{target.name}{kind}.o"
     stored = None if path is None else objects.read_object(path)
     if stored is not None:
         return stored[1]
     symbols = symbols_of(unit)
     text, _ = unit.write(symbols)
+    if is_small:
+        text = text.replace(" nounwind", SMALL)
     code = compiled(text, symbols, target)
     if path is not None:
         objects.write_object(path, [], code)
@@ -152,13 +156,16 @@ def compiled(text: str, symbols: Sequence[str], target: Platform) -> bytes:
 
 
 def build_objects(
-    units: Sequence[Unit | PairUnit],
+    units: Mapping[Unit | PairUnit, bool],
     texts: Sequence[tuple[str, str]],
     target: Platform,
     folder: Path,
 ) -> list[Path]:
-    """Object files of units and of further functions (LLVM IR, symbol), in a folder."""
-    codes = [object_of(unit, target) for unit in units]
+    """Object files of units and of further functions (LLVM IR, symbol), in a folder.
+
+    Units that steps do not call, such as the events of contacts, are made small.
+    """
+    codes = [object_of(unit, target, is_small=not hot) for unit, hot in units.items()]
     codes += [compiled(text, [symbol], target) for text, symbol in texts]
     files = []
     for k, code in enumerate(codes):

@@ -109,14 +109,16 @@ def symbol_of(entry: Entry | PairEntry) -> str:
     return symbols_of(entry.unit)[entry.k]
 
 
-def units_of(prepared: PreparedRun, directions: Directions | None) -> list[Unit | PairUnit]:
-    """The units of compiled code that a run calls, each once."""
+def units_of(prepared: PreparedRun, directions: Directions | None) -> dict[Unit | PairUnit, bool]:
+    """The units of compiled code that a run calls, and whether its steps do."""
     entries: list[Entry | PairEntry] = list(prepared.image.functions.values())
     for one in prepared.advances:
         entries += [one.entry] if one.completes is None else [one.entry, one.completes]
-    entries += [prepared.jumps.entry] if prepared.jumps else []
-    entries += directions.entries if directions else []
-    return list({entry.unit.name: entry.unit for entry in entries}.values())
+    rare: list[Entry | PairEntry] = [prepared.jumps.entry] if prepared.jumps else []
+    rare += directions.entries if directions else []
+    found = {entry.unit.name: (entry.unit, False) for entry in rare}
+    found |= {entry.unit.name: (entry.unit, True) for entry in entries}
+    return dict(found.values())
 
 
 def data_of(

@@ -12,6 +12,7 @@ from support.internals import placed_shapes
 import dap3d_core as dap
 from dap3d_core.integrators.moreau import arrays
 from dap3d_core.native.build import own_platform
+from dap3d_core.simulation.events import contact_jumps
 
 SPRING = """
 [scene]
@@ -429,3 +430,15 @@ def test_a_name_that_is_no_identifier(tmp_path):
     made = dap.export_model(scene, tmp_path / "out", format="c")
     (library,) = (made.path / own_platform()).glob("*.a")
     assert library.name == "lib_4_gr_en.a"
+
+
+@pytest.mark.parametrize(("jams", "said"), [(-1, "rattle: slip jams again and again"),
+                                            (99, "change ever faster")])  # fmt: skip
+def test_a_run_whose_contacts_come_to_no_end_says_why(tmp_path, monkeypatch, jams, said):
+    """With limits that the first change of a mode exceeds."""
+    limits = {"MOST_CHANGES": 1, "WITHIN": 9.0, "RATTLING": 9.0, "MOST_JAMS": jams}
+    for name, value in limits.items():
+        monkeypatch.setattr(contact_jumps, name, value)
+    made = dap.export_model("cradle", tmp_path / "c", format="c", t_end=5.0)
+    with pytest.raises(dap.SimulationError, match=said):
+        dap.load_native(made.path).start(5.0).step_to(5.0)

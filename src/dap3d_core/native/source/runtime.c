@@ -480,11 +480,13 @@ static void say_failure(dap3d_model *m, double t)
         "", " closes, and joints or drivers prescribe the motion of its bodies",
         " jams: its friction presses the bodies together by more than it lets them give way",
         ": its bodies overlap at the start", "s change ever faster",
-        "s slip and turn by next to nothing: that asks for steps as short"};
+        "s slip and turn by next to nothing, or rattle: slip jams again and again. Try smaller mu"};
     int has_name = m->failure < ENDLESS;
     const char *name = has_name ? contact_names[m->w[CONTACT_INTEGER + CI_culprit]] : "";
+    int rattles = m->failure == ENDLESS && m->w[CONTACT_INTEGER + CI_freed] > MOST_JAMS;
     snprintf(m->message, sizeof m->message, "the run stopped at t = %.9g s: contact%s%s%s", t,
-             has_name ? " " : "", name, words[m->failure]);
+             has_name ? " " : "", name,
+             rattles ? "s rattle: slip jams again and again. Try smaller mu" : words[m->failure]);
 }
 #endif
 
