@@ -154,6 +154,7 @@ def write_program(
     varied: Varied = None,
     tracer: StraightLine | None = None,
     others: Sequence[Floats] | None = None,
+    count: int = 1,
 ) -> tuple[str, dict[str, str]]:
     """LLVM IR of the program of one function, and the declarations that it needs.
 
@@ -166,6 +167,7 @@ def write_program(
         varied: as of ``constants``.
         tracer: records the program; left out, one of as many instructions as it may have.
         others: of a projection, as of ``merged`` (ways.py).
+        count: as of ``write_programs``.
 
     Raises:
         TraceError: the program would be too long, or have too many guards.
@@ -318,7 +320,7 @@ def write_programs(
         of = evaluator, k, time, state, names, head, varied, None
         for ways in (None,) if others is None or k != PROJECT else (others, None):
             try:
-                text, needed = write_program(*of, ways)
+                text, needed = write_program(*of, ways, count)
             except TraceError:
                 if k == RHS:
                     raise
