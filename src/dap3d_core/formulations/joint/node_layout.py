@@ -24,13 +24,12 @@ TURN, TURN_SIN, AXIS, CENTRE, LINK, MASS, INERTIA, CONSTANT_WIDTH = 0, 4, 8, 11,
 
 # Columns of ``TreeArrays.work``, vectors in global axes: P, its velocity; angular acceleration and
 # acceleration of P without q_ddot, and the matrix alpha~ + omega~ omega~ of these; from the
-# parent's P to P; axis, or omega' of a ball or free body, in its own axes; from P to the mass
-# centre;
+# parent's P to P; axis; from P to the mass centre;
 POINT, VELOCITY, ALPHA, ACCELERATION, SPIN = 0, 3, 6, 9, 12
-LINK_NOW, AXIS_NOW, OWN_W, CENTRE_NOW = 21, 24, 24, 27
+LINK_NOW, AXIS_NOW, CENTRE_NOW = 21, 24, 27
 # articulated inertia [J H; H^T M] about P, and the moment and force that are missing there, of the
-# node and all that hangs on it.
-MATRIX_M, MATRIX_H, MATRIX_J, MOMENT, FORCE, WORK_WIDTH = 30, 36, 45, 51, 54, 57
+# node and all that hangs on it; omega' of a ball or free body, in its own axes.
+MATRIX_M, MATRIX_H, MATRIX_J, MOMENT, FORCE, OWN_W, WORK_WIDTH = 30, 36, 45, 51, 54, 57, 60
 # What an elimination leaves takes their places: U/D and u/D of one freedom; J^-1 H and J^-1 n of a
 # rotation, as H and n; of a ball or free body alone omega'_dot and acceleration, as n and f; then,
 # of all, the accelerations by q_ddot.
