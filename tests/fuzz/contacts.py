@@ -1,6 +1,7 @@
 """Random scenes that touch with friction go on, or end with one clear error.
 Of balls and boxes, half of them with a linkage as well, that has limits, stops and friction.
-An input is the number of a scene; from ``LEGS`` on a body stands on 2 to 4 legs that share it.
+An input is the number of a scene; from ``LEGS`` on a body stands on 2 to 4 legs that share it, and
+from ``RESISTING`` on the scenes fall that begin with zero, and resist rolling and spinning.
 Energy is never gained, nothing sinks in, all numbers are finite, and forces obey Newton's and
 Coulomb's laws, of which the scene alone says the numbers."""
 
@@ -23,23 +24,23 @@ GAIN, DEPTH = 1e-9, 1e-9
 ENDINGS = ("jams", "asks for steps as short")
 #: Number of the first scene of legs.
 LEGS = 10**6
+#: And of those that resist rolling; no legs, whose contacts may take turns then: ``auto`` steps.
+RESISTING = 2 * LEGS
 #: Forces, N, and slips, m/s, that are rounding of such scenes: forces are some 1e2, of slips of 1.
 FORCE, SLIP = 1e-6, 1e-8
 
 
 def numbers():
     """Numbers of scenes."""
-    return st.integers(0, 2 * LEGS).map(lambda n: str(n).encode())
+    return st.integers(0, RESISTING + LEGS).map(lambda n: str(n).encode())
 
 
 def scene_of(number):
-    """1 to 4 contacts: balls and boxes that fall on a floor, balls on each other; or legs.
-
-    At those of each third scene something resists rolling and spinning.
-    """
-    scene = scene_on_legs(number) if number >= LEGS else scene_that_falls(number)
-    if number % 3 == 0:
-        add_resistance(scene, np.random.default_rng([number, 2]))
+    """1 to 4 contacts: balls and boxes that fall on a floor, balls on each other; or legs."""
+    if number < RESISTING:
+        return scene_on_legs(number) if number >= LEGS else scene_that_falls(number)
+    scene = scene_that_falls(number - RESISTING)
+    add_resistance(scene, np.random.default_rng([number, 2]))
     return scene
 
 

@@ -93,20 +93,20 @@ def drifting(nt=11, joint=False, **more):
     return result_of(scene, rows, model, "standard" if joint else "unconstrained", **more)
 
 
-def same_bits(left, right, unsigned=None):
+def same_bits(left, right, *, signs_of_zeros=True):
     for column in COLUMNS:
         a, b = (getattr(side.arrays, column.name) for side in (left, right))
         assert a.shape == b.shape
         assert a.dtype == b.dtype
-        if unsigned is not None:
-            a, b = a + unsigned, b + unsigned
+        if not signs_of_zeros:
+            a, b = a + 0.0, b + 0.0
         assert a.tobytes() == b.tobytes(), column.name
     return True
 
 
 def same_run(left, right):
     """The same bits but for the signs of zeros, which change where a program takes over (0092)."""
-    return same_bits(left, right, unsigned=0.0)
+    return same_bits(left, right, signs_of_zeros=False)
 
 
 def noisy(model, nt=9, seed=3):

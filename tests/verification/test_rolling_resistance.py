@@ -107,6 +107,18 @@ def test_events_hold_a_ball_up_to_the_limit_of_a_slope(part):
     assert result.r[:, 0, 0] == pytest.approx(0.5 * a * result.t**2, abs=1e-13)
 
 
+def test_auto_steps_where_several_contacts_of_a_body_resist():
+    """The corners of a box share the moment; a wheel has one contact, however many wheels."""
+    box = dap.Scene(name="box")
+    box.add_body("box", mass=1.0, Jp=[0.01] * 3, r=[0.0, 0.0, 0.1])
+    box.add_contact("box_plane", "c", body_i="box", size=[0.2] * 3, mu=0.5, mu_spin=0.01)
+    box.add_force("weight", "gravity")
+    notes = dap.simulate(box, t_end=0.01).notes
+    assert any("by stepping" in note and "several contacts of one body" in note for note in notes)
+    notes = dap.simulate(ball(True, mu_roll=0.01), t_end=0.01).notes
+    assert not any("by stepping" in note for note in notes)
+
+
 def test_events_locate_where_a_ball_ends_to_spin_while_it_rolls_on():
     mu_spin, w, v = 0.002, 20.0, 1.0
     scene = ball(True, v=v, w=[0.0, v / R, w], mu_spin=mu_spin, mu_roll=0.001)

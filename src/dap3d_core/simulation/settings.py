@@ -67,11 +67,23 @@ def contact_engine_reason(model: Model, contact: str) -> str:
     if contact == "auto" and model.collisions is not None:
         count = len(set(model.collisions.names))
         return f"{count} shape{'s' * (count != 1)} may meet anywhere"
+    if contact == "auto" and _rolls_on_several(model):
+        return "several contacts of one body resist that it rolls or spins"
     points = Counter(name.partition("#")[0] for name in model.contact_names)
     closed = sum(min(count, MOST_CLOSED) for count in points.values())
     if contact == "auto" and closed > MOST_BY_EVENTS:
         return f"{closed} points may touch at once, more than {MOST_BY_EVENTS}"
     return ""
+
+
+def _rolls_on_several(model: Model) -> bool:
+    """True if contacts share what resists that a body rolls: by events they may take turns."""
+    pressing: set[int] = set()
+    for group in model.contacts:
+        if group.loaded is not None and group.type_info.type.resists:  # type: ignore[attr-defined]
+            pressing.update(group.loaded.tolist())
+    count = Counter(b for k in pressing for b in set(model.joint_slots[k]) if b > 0)
+    return any(n > 1 for n in count.values())
 
 
 def settings_notes(compiled: CompiledModel, settings: Simulation) -> list[str]:
