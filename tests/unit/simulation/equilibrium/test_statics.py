@@ -144,6 +144,9 @@ def test_bristles_at_rest_stay_bent():
     assert eq.states == pytest.approx([-1e-4])
     assert eq.r[0, 0] == pytest.approx(1e4 * 1e-4 / 100.0, abs=1e-12)
     scene.bodies["block"].r = (0.02, 0.0, 0.0)
+    statics, u = statics_of(scene)  # the stiffness of the search is that of the spring alone
+    K = statics.stiffness(statics.at(u))
+    assert np.max(np.abs(np.linalg.eigvals(K))) == pytest.approx(100.0 * statics.length**2)
     with pytest.raises(dap.SimulationError, match=r"floor\.z .* keeps the way of the motion"):
         dap.equilibrium(scene)
 
