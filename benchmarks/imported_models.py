@@ -42,7 +42,7 @@ import numpy as np
 
 import dap3d_core as dap
 from dap3d_core.formats.import_model import read_articulation
-from dap3d_core.formats.import_scene.names import Names
+from dap3d_core.formats.import_scene.scene_builder import Names
 from dap3d_core.formats.import_scene.scene_of_model import ImportOptions, scene_of
 from dap3d_core.interface.formats import UNBOUNDED, Actuator, Articulation, FormatError, Remarks
 from dap3d_core.model.rotations import rotation

@@ -9,18 +9,12 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.formats.import_scene.names import Names
+from dap3d_core.formats.import_scene.scene_builder import Names
 from dap3d_core.formats.import_scene.scene_of_model import ImportOptions, scene_of
 from dap3d_core.formats.import_scene.shapes import MeshFiles
 from dap3d_core.formats.import_scene.source_files import SourceFiles
 from dap3d_core.interface.errors import PluginError
-from dap3d_core.interface.formats import (
-    Articulation,
-    FolderImporter,
-    FormatError,
-    Importer,
-    Remark,
-)
+from dap3d_core.interface.formats import Articulation, FolderImporter, FormatError, Importer, Remark
 from dap3d_core.interface.formats.articulation import KINDS
 from dap3d_core.registry import Registry, load_registry
 from dap3d_core.registry.arguments import checked

@@ -88,9 +88,7 @@ def articulation_of(scene: Scene, remarks: Remarks) -> Articulation:
     return model
 
 
-def _tree(
-    elements: SceneElements,
-) -> tuple[list[tuple[str, SceneJoint | None]], list[SceneJoint]]:
+def _tree(elements: SceneElements) -> tuple[list[tuple[str, SceneJoint | None]], list[SceneJoint]]:
     """Bodies with the joint that places each, parents first, and the joints that are left."""
     left = list(elements.joints)
     tree: list[tuple[str, SceneJoint | None]] = []

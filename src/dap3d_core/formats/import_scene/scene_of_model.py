@@ -7,8 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.formats.import_scene.actuators import add_actuators, add_tendons
-from dap3d_core.formats.import_scene.held_tendons import add_held
+from dap3d_core.formats.import_scene.actuators import add_actuators, add_held, add_tendons
 from dap3d_core.formats.import_scene.joints import (
     add_couplings,
     add_joint,
@@ -16,14 +15,8 @@ from dap3d_core.formats.import_scene.joints import (
     from_ground,
     named_ends,
 )
-from dap3d_core.formats.import_scene.names import Names
-from dap3d_core.formats.import_scene.rigid_groups import (
-    STAND_IN,
-    STEPPED,
-    RigidGroup,
-    rigid_groups,
-)
-from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, float_tuple
+from dap3d_core.formats.import_scene.rigid_groups import STAND_IN, STEPPED, RigidGroup, rigid_groups
+from dap3d_core.formats.import_scene.scene_builder import Names, SceneBuilder, float_tuple
 from dap3d_core.formats.import_scene.shapes import (
     MeshFiles,
     add_collisions,

@@ -7,8 +7,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.formats.import_scene.names import usable
-from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, float_tuple
+from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, float_tuple, usable
 from dap3d_core.interface.formats.articulation import (
     FRICTION_DIRECTIONS,
     WORLD,

@@ -1,17 +1,13 @@
 """The tree of an articulated model: which joint places each link, and where the links are."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import attrs
 import numpy as np
 
 from dap3d_core.interface.formats.articulation import KINDS, WORLD, Articulation, Joint
 from dap3d_core.interface.formats.frames import IDENTITY, Frame
-from dap3d_core.interface.formats.joint_motion import (
-    joint_motion,
-    rest_coordinates,
-    reversed_joint,
-)
+from dap3d_core.interface.formats.joint_motion import joint_motion, rest_coordinates, reversed_joint
 from dap3d_core.interface.formats.remarks import FormatError
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.suggestions import did_you_mean
@@ -62,7 +58,9 @@ class SpanningTree:
         if model.fixed_base is False:
             _hang_parents(placing, loops)
         roots = [name for name in model.links if name not in placing]
-        order, children = list(roots), _children(placing)
+        order, children = list(roots), dict[str, list[str]]()
+        for name, joint in placing.items():
+            children.setdefault(joint.parent, []).append(name)
         order += children.get(WORLD, [])
         for name in order:  # grows
             order += children.get(name, [])
@@ -111,13 +109,6 @@ def _hang_parents(placing: dict[str, Joint], loops: list[Joint]) -> None:
         if joint.kind in reversible and not (joint.closes or held):
             placing[joint.parent] = reversed_joint(joint)
             loops.remove(joint)
-
-
-def _children(placing: Mapping[str, Joint]) -> dict[str, list[str]]:
-    children: dict[str, list[str]] = {}
-    for name, joint in placing.items():
-        children.setdefault(joint.parent, []).append(name)
-    return children
 
 
 def _check(model: Articulation, joint: Joint) -> None:
