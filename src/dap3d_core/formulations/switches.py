@@ -7,7 +7,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.assembly.arrays import BEGINS, ENDS, JUMPS, MODE_ENDS, UNSEEN, Floats
-from dap3d_core.interface.codegen.specialise import is_knots
+from dap3d_core.interface.codegen.specialise import KNOTS
 from dap3d_core.model import Group, Model
 from dap3d_core.model.knots import narrowest
 
@@ -90,7 +90,7 @@ class Switch:
             touches = self.is_contact or (self.jumps and type_.unilateral and not self.words)
             return POSITION_ROUNDING * self.length if touches else 0.0
         row, numbers = self.group.numbers[self.place], self.group.type_info.layout.numbers
-        own = [place for name, place in numbers.items() if is_knots(name)]
+        own = [place for name, place in numbers.items() if name.endswith(KNOTS)]
         knots = [row[at : at + count] for at, (count,) in own]
         return NEAR_KNOT * min(map(narrowest, knots))
 

@@ -126,11 +126,6 @@ class CurvePicture(Picture):
     bands: "Mapping[str, Sequence[Band]]" = attrs.field(factory=dict)
 
     @property
-    def is_path(self) -> bool:
-        """True for the path of a point, both of whose axes have one scale."""
-        return self.x.name != "t" and list(self.panels) == [self.x.unit]
-
-    @property
     def height(self) -> float:
         """A suitable height of the figure, inches."""
         return HEIGHT if len(self.panels) == 1 else PANEL_HEIGHT * len(self.panels)
@@ -146,7 +141,7 @@ class CurvePicture(Picture):
             style_axes(ax)
         label = with_unit(self.x.label, self.x.unit)
         axes[-1].set_xlabel(folded(label, 17 * width), fontsize=LETTERS)
-        if self.is_path:
+        if self.x.name != "t" and list(self.panels) == [self.x.unit]:  # the path of a point
             axes[0].set_aspect("equal", adjustable="datalim")
         if self.title:
             figure.suptitle(shown_text(self.title), fontsize=LETTERS + 1)

@@ -23,8 +23,9 @@ from dap3d_core.result.file.schema import (
     record_of,
 )
 from dap3d_core.result.file.validate import (
-    check_attributes,
+    FORMS,
     check_claims,
+    check_forms,
     check_numbers,
     check_subject,
 )
@@ -99,7 +100,7 @@ def _read(dataset: Any) -> tuple[ModelSummary, RunMetadata, int]:
     values = older | {name: dataset.getncattr(name) for name in dataset.ncattrs()}
     for name in _JSON:
         values[name] = json.loads(values[name])
-    check_attributes(values)
+    check_forms(values, FORMS)
     summary = _subject(dataset, values)
     record = record_of(values, contacts_of(dataset))
     check_subject(summary)

@@ -21,7 +21,7 @@ from dap3d_core.result.model_summary import POINT, ModelSummary, summary_of
 from dap3d_core.result.note import Note
 from dap3d_core.result.post.contact_output import ResultContacts
 from dap3d_core.result.post.force_output import ForceOutput, force_output, reactions_of
-from dap3d_core.result.post.global_error import ErrorEstimate, estimate_of
+from dap3d_core.result.post.global_error import ErrorEstimate, sizes_of
 from dap3d_core.result.post.ledger import Entry, ledger_of
 from dap3d_core.result.post.point_motion import Energy, kinetic_energy
 from dap3d_core.result.post.reactions import Instants, Reaction, jacobians
@@ -196,7 +196,10 @@ class Result(ResultDisplay, ResultContacts):
 
         None unless requested (``simulate(..., estimate_error=True)``) and available.
         """
-        return estimate_of(self.t, self.u, self.arrays.u_error, self.record.length)
+        error = self.arrays.u_error
+        if error is None:
+            return None
+        return ErrorEstimate(self.t, error, sizes_of(self.u), self.record.length)
 
     @property
     def status(self) -> str:

@@ -14,28 +14,20 @@ class SimulationError(Exception):
         self.result = result
 
 
-def refuse_contacts(model: Any, what: str) -> None:
-    """Refuse what does not know yet that contacts hold and let go.
-
-    Args:
-        model: of a scene.
-        what: that is asked for, as the subject of a sentence.
-
-    Raises:
-        SimulationError: the scene has contacts.
-    """
+def refuse_contacts(model: Any) -> None:
+    """SimulationError where a model has contacts: kinematics does not know yet that they let go."""
     if model.contact_count:
         raise SimulationError(
-            f"{what} does not take contacts yet, and the scene has some "
+            "kinematics does not take contacts yet, and the scene has some "
             f"({model.contact_names[0].partition('#')[0]}): take them out, or run the scene "
             "(simulate), which does. Stops with a stiffness k, and friction with a w_tol or v_tol, "
             "are no contacts"
         )
-    refuse_collisions(model, what)
+    refuse_collisions(model, "kinematics")
 
 
 def refuse_collisions(model: Any, what: str) -> None:
-    """Refuse what knows declared contacts, and not what steps alone can follow; as above."""
+    """Refuse what (a subject of a sentence) knows contacts, and not what steps alone can follow."""
     if model.collisions is not None:
         raise SimulationError(
             f"{what} does not take shapes that collide yet, and the scene has some "
@@ -51,7 +43,7 @@ def refuse_collisions(model: Any, what: str) -> None:
 
 
 def refuse_breaks(model: Any, what: str) -> None:
-    """Refuse what does not know that joints break; as above."""
+    """SimulationError where joints may break, which ``what`` does not know."""
     for joint in model.breaks:
         raise SimulationError(
             f"{what} does not take joints that may break or hold at times yet, and the scene has "

@@ -104,11 +104,14 @@ def stiffness_notes(integrations: Sequence[Integration], integrator: str) -> lis
 
 
 def _left(run: RunState) -> float:
-    """Time left until the pose that has stopped the implicit integrator; infinite if none has."""
+    """Time left until the near pose that has stopped the implicit integrator; infinite if none."""
     present, span = run.present, run.t_end
     if not present.implicit or present.status not in FAILURES:
         return np.inf
-    return time_left(lengths_at(run.evaluator, present.t, present.y, span), span)
+    lengths = lengths_at(run.evaluator, present.t, present.y, span)
+    now, rate = lengths[:, lengths[RATE] < 0.0]
+    nearest = float(np.min(-now / rate, initial=np.inf))
+    return nearest if nearest < NEAR * span else np.inf
 
 
 def _aim_across(run: RunState, left: float) -> None:
@@ -148,13 +151,6 @@ def mean_rate(now: Floats, rate: Floats, bend: Floats) -> Floats:
     powers = np.where((powers > 1.0) & (powers <= HIGHEST), powers, 1.0)
     mean = np.where(inside >= 0.0, 0.5 * (rate - np.sqrt(inside)), rate / powers)
     return np.where((rate < 0.0) & (bend > 0.0), mean, rate)
-
-
-def time_left(lengths: Floats, span: float) -> float:
-    """Time left until one of the lengths vanishes; infinite where that is not near."""
-    now, rate = lengths[:, lengths[RATE] < 0.0]
-    nearest = float(np.min(-now / rate, initial=np.inf))
-    return nearest if nearest < NEAR * span else np.inf
 
 
 def _lengths(evaluator: Evaluator, t: float, y: Floats) -> Floats:

@@ -55,7 +55,11 @@ def open_result(
         try:
             compiled = CompiledModel(scene, allow_code=allow_code)
         except (PluginError, SceneError, SimulationError) as error:
-            raise _unmade(path, error, allow_code and home is not None) from error
+            reason = rebuild_error(error, allowed=allow_code and home is not None)
+            raise ResultError(
+                f"the model of {path} cannot be made again, which the Jacobian, reactions and "
+                f"forces need: {reason}. All other arrays are in the file"
+            ) from error
         _check_types(path, known, compiled)
         return compiled.model, lambda: compiled.evaluator
 
@@ -79,14 +83,6 @@ def _check_types(
             "Jacobian, reactions and forces cannot be computed with them. Bring back the files of "
             "these types, or run the scene again. All other arrays are in the file"
         )
-
-
-def _unmade(path: str | os.PathLike[str], error: Exception, allowed: bool) -> ResultError:
-    """The error for a model that cannot be made again from the scene in a result."""
-    return ResultError(
-        f"the model of {path} cannot be made again, which the Jacobian, reactions and forces need: "
-        f"{rebuild_error(error, allowed=allowed)}. All other arrays are in the file"
-    )
 
 
 def rebuild_error(error: Exception, *, allowed: bool) -> str:

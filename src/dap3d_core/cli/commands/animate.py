@@ -32,13 +32,7 @@ from dap3d_core.cli.process.exit_codes import DONE, INTERRUPTED, Refused, refusi
     saves=True,
 )  # fmt: skip
 def animate(
-    result: str,
-    *,
-    output: str | None,
-    size: str | None,
-    fit: bool,
-    force: bool,
-    **given: Any,
+    result: str, *, output: str | None, size: str | None, fit: bool, force: bool, **given: Any
 ) -> int:
     """Draw the motion of a RESULT as a stick figure: a GIF, an MP4 or a snapshot.
 

@@ -37,12 +37,7 @@ NO_FORMULAS = {"purity", "plain", "compiled"}
     options.JSON, options.QUIET,
 )  # fmt: skip
 def check_plugin(
-    names: tuple[str, ...],
-    *,
-    every: bool,
-    poses: int,
-    seed: int,
-    allow_code: bool,
+    names: tuple[str, ...], *, every: bool, poses: int, seed: int, allow_code: bool
 ) -> int:
     """Check the formulas of types of joints, forces and functions.
 

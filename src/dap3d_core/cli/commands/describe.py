@@ -238,11 +238,16 @@ def _show(console: "Terminal", data: dict[str, Any], *, names: bool) -> None:
     pairs = [("acts on", bodies_text(data)), ("from", f"{origin}, {data['module']}")]
     if data["kind"] == "joint":
         pairs[:1] = [("rows", rows_text(data)), ("bodies", bodies_text(data))]
-        pairs[2:2] = [("motion", motion_text(motion)) for motion in data["motions"]]
+        pairs[2:2] = [
+            ("motion", f"with {m['variant']}: {m['words']}" if m["variant"] else m["words"])
+            for m in data["motions"]
+        ]
     if data["synonyms"]:
         pairs.append(("called", ", ".join(data["synonyms"]) + " elsewhere"))
     if data["states"]:
-        pairs.append(("states", states_text(data["states"])))
+        states = (name if n == 1 else f"{name} ({n} numbers)" for name, n in data["states"].items())
+        initial = "initial values by fields in _0, tolerances by fields in _atol"
+        pairs.append(("states", f"{', '.join(states)}; {initial}"))
     console.facts(pairs)
     console.title("fields")
     if data["fields"]:
@@ -270,17 +275,6 @@ def _show_source(console: "Terminal", data: dict[str, Any]) -> None:
             how = "derived" if name in each["derived"] else "as written"
             console.title(f"{name} of {each['class']}, {how}")
             console.print(text, markup=False, highlight=False, soft_wrap=True)
-
-
-def motion_text(motion: Mapping[str, Any]) -> str:
-    """A motion as ``_motions`` has it, with the variant if any."""
-    return f"with {motion['variant']}: {motion['words']}" if motion["variant"] else motion["words"]
-
-
-def states_text(states: Mapping[str, int]) -> str:
-    """The states of a type, in words."""
-    words = (name if n == 1 else f"{name} ({n} numbers)" for name, n in states.items())
-    return f"{', '.join(words)}; initial values by fields in _0, tolerances by fields in _atol"
 
 
 def bodies_text(data: dict[str, Any]) -> str:

@@ -128,8 +128,9 @@ def _check_free(names: dict[str, str], *, force: bool) -> None:
                 else "with both installed scenes must say which, "
                 f'type = "{names["distribution"]}:{keyword}"'
             )
+            article = "an" if kind[0] in "aeiou" else "a"
             raise Refused(
-                f"there is {_article(kind)} {noun_of(kind)} {keyword!r} already, from {rival}: "
+                f"there is {article} {noun_of(kind)} {keyword!r} already, from {rival}: "
                 f"{both}. Use another name, or --force"
             )
     if importlib.util.find_spec(module) is not None:
@@ -137,10 +138,6 @@ def _check_free(names: dict[str, str], *, force: bool) -> None:
             f"a module {module} is installed already; use another name, or --force if it will be "
             "removed"
         )
-
-
-def _article(kind: str) -> str:
-    return "an" if kind[0] in "aeiou" else "a"
 
 
 def _built_in(kind: str) -> Collection[str]:

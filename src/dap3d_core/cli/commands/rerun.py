@@ -19,13 +19,7 @@ if TYPE_CHECKING:
     options.RESULT, options.MODEL_OF_RESULT, options.ALLOW_CODE, options.JSON, options.QUIET,
 )  # fmt: skip
 @click.pass_context
-def rerun(
-    ctx: click.Context,
-    result: str,
-    model: str | None,
-    *,
-    allow_code: bool,
-) -> int:
+def rerun(ctx: click.Context, result: str, model: str | None, *, allow_code: bool) -> int:
     """Repeat the run of a RESULT and compare, bit for bit.
 
     The scene, the settings and the versions that made it are in the result; no other file is

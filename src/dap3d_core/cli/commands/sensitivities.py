@@ -59,7 +59,9 @@ def sensitivities(
     scene = dap.load(model)
     with refusing(dap.SimulationError, UnknownNameError):
         found = dap.sensitivities(scene, list(by), allow_code=allow_code, **settings)
-        quantities = _scalar(found, of or _usual(found))
+        last = found.result.summary.body_names[-1]
+        usual = tuple(found.result.outputs) or tuple(f"{last}.r.{axis}" for axis in "xyz")
+        quantities = _scalar(found, of or usual)
         data = _data(scene.name, found, quantities)
     if output is not None:
         _write(found, quantities, Path(output), force=force)
@@ -73,11 +75,6 @@ def _check(target: Path) -> None:
 
     if target.suffix.lower() not in (".nc", *FORMATS):
         raise ValueError(f"cannot write {target}: write .nc, or a figure: {', '.join(FORMATS)}")
-
-
-def _usual(found: "Sensitivities") -> tuple[str, ...]:
-    names = found.result.summary.body_names
-    return tuple(found.result.outputs) or tuple(f"{names[-1]}.r.{axis}" for axis in "xyz")
 
 
 def _scalar(found: "Sensitivities", quantities: tuple[str, ...]) -> tuple[str, ...]:

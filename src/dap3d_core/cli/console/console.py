@@ -206,10 +206,7 @@ def stderr() -> Terminal:
 
 
 def show_written(
-    target: Path,
-    contents: str,
-    data: Mapping[str, Any],
-    notes: Sequence[str] = (),
+    target: Path, contents: str, data: Mapping[str, Any], notes: Sequence[str] = ()
 ) -> None:
     """Report a file that was written: its contents in words, or the same as JSON data."""
     byte_count = target.stat().st_size
@@ -221,11 +218,7 @@ def show_written(
         stdout().say(f"{target} written ({size(byte_count)}): {contents}", whole=True)
 
 
-def show_data(
-    data: Any,
-    show: Callable[[Terminal], None],
-    *written: str | Path | None,
-) -> None:
+def show_data(data: Any, show: Callable[[Terminal], None], *written: str | Path | None) -> None:
     """Print data as JSON, or what ``show`` prints of it and the files that were written."""
     if prints_json():
         print_json(data)

@@ -66,9 +66,11 @@ def _judge(error: BaseException) -> tuple[int, str]:
     """Exit code and text of an error."""
     from dap3d_core.interface.errors import PluginError, is_out_of_memory
 
-    lack = exit_codes.FAILED, f"there is not enough memory for this{_memory_limit()}"
+    limit = address_space()
+    words = "" if limit is None else f"; it may take {limit // 1024:,} kB (ulimit -v)"
+    lack = exit_codes.FAILED, f"there is not enough memory for this{words}"
     is_lack = is_out_of_memory(error) or (isinstance(error, Exception) and is_used_up())
-    if is_lack and (isinstance(error, MemoryError) or address_space() is not None):
+    if is_lack and (isinstance(error, MemoryError) or limit is not None):
         return lack
     from dap3d_core.scene import SceneError
 
@@ -99,12 +101,6 @@ def _judge(error: BaseException) -> tuple[int, str]:
         file = f"{error.filename}: " if error.filename else ""
         return exit_codes.FAILED, f"cannot read or write: {file}{error.strerror}"
     return exit_codes.FAILED, str(error)
-
-
-def _memory_limit() -> str:
-    """The limit on the memory of the process, in words; "" without one."""
-    limit = address_space()
-    return "" if limit is None else f"; it may take {limit // 1024:,} kB (ulimit -v)"
 
 
 def _folder_is_gone() -> bool:

@@ -38,11 +38,6 @@ def uncalled(type_info: TypeInfo) -> str:
                key=len, default="")  # fmt: skip
 
 
-def is_knots(name: str) -> bool:
-    """True if a number of a layout holds the knots of a function."""
-    return name.endswith(KNOTS)
-
-
 def bind_functions(
     type_info: TypeInfo, functions: Mapping[str, TypeInfo], knots: Mapping[str, int]
 ) -> TypeInfo:

@@ -142,12 +142,6 @@ def check_unknowns(type_: type[TypeBase]) -> None:
             raise PluginError(f"{who}.C_dot is to be linear in the velocities; it names {name}_dot")
 
 
-def bound_count(type_: type[TypeBase]) -> int:
-    """Bounds at which a run ends: two of each unknown that is not periodic."""
-    assert issubclass(type_, Joint)
-    return 2 * len([name for name in unknown_names(type_) if name not in type_.periodic])
-
-
 def _check_name(type_: type[Joint], name: Any) -> None:
     who, specs = where_is(type_), specs_of(type_)
     if not (isinstance(name, str) and name.isidentifier() and not iskeyword(name)):

@@ -76,7 +76,9 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     layout = layout_of(type_, _random_constants(type_, rng))
     _check_symbol(type_, layout)
     _check_named_fields(type_, layout)
-    _check_reset(type_, layout)
+    if "reset" in type_.kernels() and not layout.states:
+        what = 'defines reset, but no states; add e.g. states = ("z",) and rate'
+        raise PluginError(f"{where_is(type_)} {what}")
     if has_states:
         from dap3d_core.interface.examine.check_states import check_state_names
 
@@ -116,9 +118,9 @@ def _bounds(type_: type[TypeBase]) -> dict[str, tuple[str, ...]]:
     """Output of the distances of unknowns from their bounds."""
     if not unknown_names(type_):
         return {}
-    from dap3d_core.interface.examine.check_states import bound_count
-
-    return {"bound": tuple(f"out[{k}]" for k in range(bound_count(type_)))}
+    assert issubclass(type_, Joint)
+    bounded = [name for name in unknown_names(type_) if name not in type_.periodic]
+    return {"bound": tuple(f"out[{k}]" for k in range(2 * len(bounded)))}
 
 
 def _further_names(
@@ -430,12 +432,6 @@ def _check_names(
                 "at position level only positions and time may be used "
                 "(move the term to gamma or wrench)"
             )
-
-
-def _check_reset(type_: type[TypeBase], layout: InstanceLayout) -> None:
-    if "reset" in type_.kernels() and not layout.states:
-        who = where_is(type_)
-        raise PluginError(f'{who} defines reset, but no states; add e.g. states = ("z",) and rate')
 
 
 def _check_jumps(type_: type[TypeBase], outputs: Mapping[str, Sequence[str]], slots: int) -> None:

@@ -4,11 +4,7 @@ import math
 import random
 from typing import Any
 
-from dap3d_core.interface.codegen.kernel_arguments import (
-    PARTIALS,
-    SEVERAL,
-    KernelArgument,
-)
+from dap3d_core.interface.codegen.kernel_arguments import PARTIALS, SEVERAL, KernelArgument
 from dap3d_core.interface.fields import FieldSpec
 from dap3d_core.interface.types import BodyPose, pose
 

@@ -61,18 +61,6 @@ class FilmFormat(NamedTuple):
     fps: Callable[[float], float]
 
 
-def write_film(form: FilmFormat, part: Path, target: Path, frames: Frames, fps: float) -> None:
-    """Write frames, (height, width, 4) bytes each, each used before the next is requested.
-
-    Raises:
-        ResultError: the disk or the encoder refuses; no ffmpeg.
-    """
-    try:
-        form.write(part, frames, fps)
-    except OSError as error:
-        raise cannot("write", target, error) from error
-
-
 def _write_gif(part: Path, frames: Frames, fps: float) -> None:
     from PIL import Image
 
@@ -213,7 +201,10 @@ def animate(
     with whole_file(target, force) as part:
         if suffix in FILMS:
             frames = _frames(result, stage, times, clock, progress)
-            write_film(FILMS[suffix], part, target, frames, fps)
+            try:
+                FILMS[suffix].write(part, frames, fps)
+            except OSError as error:
+                raise cannot("write", target, error) from error
         else:
             stage.place(*pose_at(result, float(times[0])), clock(float(times[0])))
             stage.figure.savefig(part, format=suffix[1:], metadata=PICTURES[suffix])

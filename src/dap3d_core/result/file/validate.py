@@ -46,15 +46,6 @@ def check_shapes(file: Path, shapes: Iterable[tuple[int, ...]], byte_count: int)
         )
 
 
-def check_attributes(found: Mapping[str, Any]) -> None:
-    """Checks the form of a file's global attributes, with JSON decoded.
-
-    Raises:
-        ValueError: names the first that is invalid.
-    """
-    check_forms(found, FORMS)
-
-
 def check_forms(found: Mapping[str, Any], forms: Mapping[str, Form]) -> None:
     """Raises ValueError for the first entry that is not of its form."""
     for name, (fits, what) in forms.items():

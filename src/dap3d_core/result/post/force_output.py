@@ -46,11 +46,7 @@ class ForceOutput:
 
 @np.errstate(all="ignore")  # as compiled code does
 def force_output(
-    evaluator: "Evaluator",
-    at: Instants,
-    v_dot: Floats,
-    name: str,
-    actuation: Floats | None = None,
+    evaluator: "Evaluator", at: Instants, v_dot: Floats, name: str, actuation: Floats | None = None
 ) -> ForceOutput:
     """Evaluates a force element; unknown angles are counted from one instant to the next.
 

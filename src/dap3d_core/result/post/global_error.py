@@ -135,13 +135,6 @@ def least_sizes(t: Floats, length: float) -> dict[str, float]:
     return {name: SMALLEST_PART * size for name, size in sizes.items()}
 
 
-def estimate_of(
-    t: Floats, u: Floats, u_error: Floats | None, length: float
-) -> ErrorEstimate | None:
-    """The estimate of a result's arrays; None if there is none."""
-    return None if u_error is None else ErrorEstimate(t, u_error, sizes_of(u), length)
-
-
 def difference(u: Floats, other: Floats) -> Floats:
     """State u minus another one of the same bodies, Euler parameters with the closer sign.
 

@@ -14,8 +14,8 @@ from dap3d_core.result.file.atomic_write import whole_file
 from dap3d_core.result.post.reactions import DENSE_ROWS, jacobians
 from dap3d_core.result.quantities.catalogue import ACTIONS, MOTION, SYSTEM, Quantity
 from dap3d_core.result.quantities.lookup import (
+    CONTACT_QUANTITIES,
     available_outputs,
-    contact_quantities,
     find,
     joint_coordinates,
 )
@@ -65,7 +65,9 @@ def columns_of(result: "Result", reactions: bool = True) -> list[TableColumn]:
         columns.append(TableColumn(f"{joint}.lambda.{number}", "SI", result.Lam[:, row]))
     if reactions:
         columns.extend(_of_joints(result))
-        for quantity in (*joint_coordinates(result), *contact_quantities(result)):
+        points, names = result.summary.contact_points, CONTACT_QUANTITIES
+        contacts = (find(result, f"{point}.{name}") for point in points for name in names)
+        for quantity in (*joint_coordinates(result), *contacts):
             columns.extend(_of_quantity(quantity))
     for output in available_outputs(result):
         columns.extend(_of_quantity(output))

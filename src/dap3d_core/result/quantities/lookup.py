@@ -146,17 +146,6 @@ def joint_coordinates(result: QuantitySource) -> Iterator[Quantity]:
                 yield find(result, f"{joint}.q{k + 1}_dot")
 
 
-def contact_quantities(result: QuantitySource) -> Iterator[Quantity]:
-    """The quantities of all points of contacts, those of each together.
-
-    Raises:
-        ResultError: the model is not available.
-    """
-    for point in result.summary.contact_points:
-        for attribute in CONTACT_QUANTITIES:
-            yield find(result, f"{point}.{attribute}")
-
-
 def available_outputs(result: QuantitySource) -> Iterator[Quantity]:
     """The outputs of the scene that can be computed: some need the model for that."""
     for name in result.outputs:

@@ -313,7 +313,11 @@ def _node(tree: ast.AST, depth: int) -> Node:
         case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
             return _number(number)
         case ast.Constant(value=str() as name):
-            return _quoted(name)
+            if not name.strip() or not name.isprintable():
+                raise ExpressionError(
+                    "has an empty name or one of unprintable characters in quotes"
+                )
+            return name
         case ast.Name() | ast.Attribute():
             return _named(tree)
         case ast.UnaryOp(op=ast.UAdd(), operand=operand):
@@ -339,12 +343,6 @@ def _number(number: float) -> float:
     if not math.isfinite(value):
         raise ExpressionError("has a number that is too large")
     return value
-
-
-def _quoted(name: str) -> str:
-    if not name.strip() or not name.isprintable():
-        raise ExpressionError("has an empty name or one of unprintable characters in quotes")
-    return name
 
 
 def _named(tree: ast.Name | ast.Attribute) -> Node:

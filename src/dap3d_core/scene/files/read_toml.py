@@ -250,7 +250,9 @@ def _find(source: Any) -> tuple[Path, list[str]]:
     if not (path / SCENE_FILE).exists():
         if shipped is not None:
             return shipped / SCENE_FILE, []
-        raise _no_scene_in(path, models)
+        others = sorted(f.name for f in path.glob("*.toml"))
+        remedy = f"it holds {', '.join(others[:5])}; give that file" if others else ""
+        raise file_error(path, f"the folder has no {SCENE_FILE}", remedy=remedy)
     notes = []
     if shipped is not None and shipped.resolve() != path.resolve():
         notes.append(f"{text} is also the name of a shipped model; the folder {path} was read")
@@ -356,12 +358,6 @@ def _scene_files(folder: Path) -> list[str]:
         return sorted(f.name for f in folder.glob("*.toml"))
     except (OSError, ValueError):
         return []
-
-
-def _no_scene_in(path: Path, models: dict[str, Path]) -> SceneError:
-    others = sorted(f.name for f in path.glob("*.toml"))
-    remedy = f"it holds {', '.join(others[:5])}; give that file" if others else ""
-    return file_error(path, f"the folder has no {SCENE_FILE}", remedy=remedy)
 
 
 def read_text(path: Path, largest: int, remedy: str = "save it as UTF-8") -> str:

@@ -180,7 +180,9 @@ class Jumps:
                 "element out, or give the driver's bodies a freedom"
             ) from error
         if not jump.elements:
-            self._record_crossings(t, crossing)
+            for k in np.flatnonzero(crossing).tolist():  # switches that brought no jump
+                self._record(EventRecord(name=self._title(k), t=t, direction=int(crossing[k]),
+                                         kind="switch"))  # fmt: skip
             self._refuse_what_nothing_carries(integration)
             return
         self.lose |= abs(jump.work) > LOSSLESS * jump.exchanged
@@ -240,12 +242,6 @@ class Jumps:
         """Kind and name of the element of a switch."""
         switch = self._evaluator.switches[k]
         return f"{switch.group.type_info.type.kind} {switch.name(self._evaluator.model)}"
-
-    def _record_crossings(self, t: float, crossing: Floats) -> None:
-        """Record switches that have crossed and brought no jump."""
-        for k in np.flatnonzero(crossing).tolist():
-            direction = int(crossing[k])
-            self._record(EventRecord(name=self._title(k), t=t, direction=direction, kind="switch"))
 
     def _record(self, record: EventRecord) -> None:
         self.count += 1

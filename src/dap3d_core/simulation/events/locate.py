@@ -276,10 +276,6 @@ class EventLocator:
     def _all(self, instant: Instant) -> list[float]:
         return [event.value(instant) for event in self.events]
 
-    def _is_past(self, k: int, value: float) -> bool:
-        """True if a number has passed its level since the last step; reaching it counts."""
-        return self._sides[k] != 0.0 and value * self._sides[k] <= 0.0
-
     def _slope(self, integration: Integration) -> Floats:
         """dy/dt at the state of the integration."""
         slope = integration.dy_dt
@@ -387,7 +383,7 @@ class EventLocator:
         changes, passed = False, [0.0] * len(self.events)
         for k, event in enumerate(self.events):
             side, value = self._sides[k], self._values[k]
-            if not self._is_past(k, value):
+            if side == 0.0 or value * side > 0.0:  # reaching the level counts as passing it
                 self._sides[k] = side or float(np.sign(value))
                 continue
             self._sides[k] = float(np.sign(value))  # 0 where it is reached: until it leaves

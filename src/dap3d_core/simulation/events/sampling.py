@@ -179,7 +179,9 @@ class Sampler:
             miss, turns = self._misfit(values), self._turns(value, a, b, values)
             followed = miss <= MISFIT * np.ptp(values) + LEVEL_ROUNDING * self._largest
             if self._may_hide(values, miss, turns, followed):
-                least = self._narrowest(step, resolution)
+                many = self._kink_windows > MAX_KINK_WINDOWS
+                least = (NARROWEST if many else NARROWEST_AT_KINK) * step
+                least = min(max(least, resolution), self._widest)
                 if b - a > least and left > 0.0:
                     self._kink_windows += b - a < NARROWEST * step
                     self._width = max(NARROWER * (b - a), least)
@@ -230,11 +232,6 @@ class Sampler:
             return True
         one_side = bool(np.all(values > 0.0) or np.all(values < 0.0))
         return not (followed or (one_side and min(nearest) > CLEARANCE * miss))
-
-    def _narrowest(self, step: float, resolution: float) -> float:
-        """Width below which a window is not narrowed."""
-        fraction = NARROWEST if self._kink_windows > MAX_KINK_WINDOWS else NARROWEST_AT_KINK
-        return min(max(fraction * step, resolution), self._widest)
 
     def _with_turns(
         self,

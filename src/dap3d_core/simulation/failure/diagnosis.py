@@ -68,12 +68,11 @@ def _at(evaluator: Evaluator, t: float, y: Floats) -> str:
                 name = _name(evaluator, kind, group, k)
                 title = "contact" if group.type_info.type.is_contact else _title(kind)
                 return f"{title} {name} (type {group.keyword}) is {fault}"
-    return (
-        _jammed(evaluator, t, y)
-        or _without_direction(evaluator, t, y)
-        or _singular(evaluator, t)
-        or _accelerated(evaluator, t, y)
-    )
+    found = _jammed(evaluator, t, y) or _without_direction(evaluator, t, y)
+    if found := found or _singular(evaluator, t):
+        return found
+    fault = _fault_of_bodies(evaluator, _rates(evaluator, t, y))  # though what acts on it is not
+    return f"the acceleration of body {fault}" if fault else ""
 
 
 def _jammed(evaluator: Evaluator, t: float, y: Floats) -> str:
@@ -142,12 +141,6 @@ def _fault(*numbers: Floats) -> str:
         return "not finite"
     too_large = any(bool(np.any(np.abs(part) > LARGEST)) for part in numbers)
     return f"beyond {LARGEST:g}, too large" if too_large else ""
-
-
-def _accelerated(evaluator: Evaluator, t: float, y: Floats) -> str:
-    """The body whose acceleration is too large, though all that acts on it is not."""
-    fault = _fault_of_bodies(evaluator, _rates(evaluator, t, y))
-    return f"the acceleration of body {fault}" if fault else ""
 
 
 def _fault_of_bodies(evaluator: Evaluator, numbers: Floats) -> str:

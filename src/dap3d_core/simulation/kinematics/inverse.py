@@ -11,7 +11,6 @@ import numpy as np
 from dap3d_core.formulations.common.friction import PASSES, forces_by
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.model import Model
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result, RunMetadata, RunStatistics, information
 from dap3d_core.result.arrays import Arrays
@@ -328,7 +327,9 @@ def _solve(balance: Balance, evaluator: Evaluator, u: Floats, needed: Floats) ->
     closed, contacts, t, states = balance.closed, balance.contacts, balance.t, evaluator.states
     balance.solve(needed)
     guess, taken, rests, rest = balance.Lam, list[Floats](), list[Floats](), np.zeros(0)
-    for _ in range(PASSES if _is_iterated(evaluator.model) else 0):
+    model = evaluator.model
+    depends = len(model.iterated_forces) > model.contact_count or bool(model.loaded_contacts)
+    for _ in range(PASSES if depends else 0):
         if closed is not None and contacts is not None:
             closed.take_loads(contacts.table, guess)
             evaluator.states = closed.loaded
@@ -361,11 +362,6 @@ def _extrapolated(given: Floats, taken: list[Floats], rests: list[Floats]) -> Fl
     share = np.linalg.lstsq(changes, rests[-1], rcond=1e-10)[0]
     found: Floats = given - (moves + changes) @ share
     return found
-
-
-def _is_iterated(model: Model) -> bool:
-    """True if forces, friction of joints among them, depend on multipliers of joints."""
-    return len(model.iterated_forces) > model.contact_count or bool(model.loaded_contacts)
 
 
 def _notes(evaluator: Evaluator, actuators: list[Actuator], forces: _Forces) -> list[str]:

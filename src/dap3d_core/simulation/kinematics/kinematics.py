@@ -89,7 +89,7 @@ def kinematics(
     """
     check_output(output, force=force)
     compiled = compile_exact(scene, allow_code, announce)
-    refuse_contacts(compiled.model, "kinematics")
+    refuse_contacts(compiled.model)
     coordinate = None
     if over is not None:
         coordinate = _coordinate(over, compiled, t_end, dt)
@@ -294,7 +294,7 @@ class _Kinematics:
         """Why kinematics is not possible: the freedoms that no driver fixes."""
         drivers = driver_names(self.compiled)
         have = f"the drivers ({', '.join(drivers)}) leave" if drivers else "it has no driver:"
-        left = freedoms_left(self.evaluator, 0.0, start.u, start.redundancy.rank.dof)
+        left = freedoms_left(self.evaluator, start.u, start.redundancy.rank.dof)
         head, _, rest = left.partition("\n")
         if drivers:
             head = head.replace(" are left", "").replace(" is left", "")

@@ -91,10 +91,10 @@ def motion_words(model: Model, motion: Floats) -> str:
     )
 
 
-def freedoms_left(evaluator: Evaluator, t: float, u: Floats, dof: int) -> str:
-    """The freedoms at a state as a paragraph, a line for each."""
+def freedoms_left(evaluator: Evaluator, u: Floats, dof: int) -> str:
+    """The freedoms at a state at t = 0 as a paragraph, a line for each."""
     model = evaluator.model
-    motions = free_motions(evaluator, t, u).T
+    motions = free_motions(evaluator, 0.0, u).T
     count = f"{dof} degree{'s' if dof != 1 else ''} of freedom {'are' if dof != 1 else 'is'} left"
     lines = [f"  ({k}) {motion_words(model, motion)}"
              for k, motion in enumerate(motions[:MOST_MOTIONS], start=1)]  # fmt: skip

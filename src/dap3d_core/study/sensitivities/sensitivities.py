@@ -408,7 +408,9 @@ class DifferentiatedRun(Run):
         slopes = slopes.reshape(count, work.rows.shape[1], len(self.neighbours)).copy()
         if count and not self.evaluator.coordinates.are_of_bodies:
             motion = slice(1, work.state.shape[1])  # without the work done, which may be large
-            slopes = self._derivative(_body_rows, raw, slopes, motion)
+            slopes = self._derivative(
+                lambda run, rows: run.evaluator.body_rows(rows), raw, slopes, motion
+            )
         if count:
             self.slopes.append(slopes)
             self.reported.append(self.evaluator.body_rows(raw))
@@ -418,11 +420,7 @@ class DifferentiatedRun(Run):
         return type(integration).rows(integration)
 
     def _derivative(
-        self,
-        function: Callable[[Run, Floats], Floats],
-        x: Floats,
-        slopes: Floats,
-        motion: slice,
+        self, function: Callable[[Run, Floats], Floats], x: Floats, slopes: Floats, motion: slice
     ) -> Floats:
         return total_derivative(function, self.neighbours, self.base, x, slopes, motion)
 
@@ -473,10 +471,6 @@ class DifferentiatedRun(Run):
             if offset := beside.offset_of(run):
                 return offset, j
         return 0.0, 0
-
-
-def _body_rows(run: Run, rows: Floats) -> Floats:
-    return run.evaluator.body_rows(rows)
 
 
 def _finite(x: Floats) -> Floats:

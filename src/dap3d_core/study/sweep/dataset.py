@@ -144,18 +144,13 @@ def layout_of(ensemble: Ensemble, design: Design, points: Floats) -> SweepLayout
     ]
     if ensemble.study.gradients:
         sizes[PARAMETER] = len(ensemble.parameters)
-        outputs += [
-            Variable(derivative_name(o.name), (*o.dimensions, PARAMETER), _of_derivative(o.about))
-            for o in outputs
-        ]
+        for o in outputs.copy():
+            unit, label = o.about.get("units", "1"), o.about["long_name"]
+            about_it = about(f"{unit} per unit of parameter", f"derivative of {label}")
+            dimensions = (*o.dimensions, PARAMETER)
+            outputs.append(Variable(derivative_name(o.name), dimensions, about_it))
     about_all = _attributes(ensemble, design, outputs)
     return SweepLayout(sizes, design.dimensions, tuple(coordinates), tuple(outputs), about_all)
-
-
-def _of_derivative(about_output: dict[str, Any]) -> dict[str, Any]:
-    """Attributes of the derivatives of an output."""
-    unit, label = about_output.get("units", "1"), about_output["long_name"]
-    return about(f"{unit} per unit of parameter", f"derivative of {label}")
 
 
 def _attributes(

@@ -197,7 +197,10 @@ class _Runner:
                 store.finish()
         except BaseException as error:
             with suppress(ResultError):
-                Computed(_partial_result(store)).attach(error)
+                if isinstance(store, SweepFile):
+                    store.leave()
+                partial = store.dataset() if isinstance(store, InMemory) else open_sweep(store.part)
+                Computed(partial).attach(error)
             raise
         return store.dataset() if isinstance(store, InMemory) else open_sweep(store.target)
 
@@ -234,11 +237,3 @@ class _Runner:
     def _report(self, done: int, total: int) -> None:
         if self.progress is not None:
             self.progress(done, total)
-
-
-def _partial_result(store: InMemory | SweepFile) -> "xarray.Dataset":
-    """The points that an interrupted sweep has computed; its part stays."""
-    if isinstance(store, InMemory):
-        return store.dataset()
-    store.leave()
-    return open_sweep(store.part)

@@ -6,12 +6,7 @@ Numbers that come of no array have no slopes, which are not computed then.
 
 import re
 
-from dap3d_core.kernels.compiler.derivatives.instructions import (
-    DOUBLE,
-    ONE,
-    RESULT,
-    Instructions,
-)
+from dap3d_core.kernels.compiler.derivatives.instructions import DOUBLE, ONE, RESULT, Instructions
 from dap3d_core.kernels.compiler.types import CompileError
 from dap3d_core.kernels.compiler.writer import DIFFERENTIATED, SLOPES, VALUES
 
