@@ -190,7 +190,7 @@ def test_check_plugin_takes_lengths_that_are_not_negative_alone():
 @pytest.mark.parametrize("contact", ["events", "stepping"])
 def test_a_run_ends_where_a_length_becomes_negative(contact):
     """v dv/dx = -a (1 - 2 x), a = 0.02 g / (1.4 R), up to x = 0.5; steps look every 2 ms."""
-    with pytest.raises(dap.SimulationError, match="contact c_roll would drive: .* is -"):
+    with pytest.raises(dap.SimulationError, match=r"contact c_roll would drive: .* is -"):
         dap.simulate(wheel(Wheel, part_lost=-0.1), t_end=1.0, contact=contact)
     with pytest.raises(dap.SimulationError, match="contact c_roll would drive") as error:
         dap.simulate(wheel(Downhill), t_end=1.0, contact=contact, contact_step=2e-3, dt=1e-3)

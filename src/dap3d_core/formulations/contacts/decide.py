@@ -128,6 +128,9 @@ def repeat(t: float, s: ContactArrays, system: System, loops: Any, tensions: Any
     put_rows(t, s, system, loops)
     stop(s, system)
     repeat_rounds(s, system)
+    for c in range(s.mode.shape[0]):  # what sticks from here on slips no more, soon
+        s.was[c], s.stops[c] = s.mode[c], s.mode[c] == 2.0
+    stop(s, system)
     for c in range(s.mode.shape[0]):
         s.role[c], s.values[c] = s.mode[c] > 0.5, s.closing[c]
     lift(s)
