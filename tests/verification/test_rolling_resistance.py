@@ -161,13 +161,18 @@ class Downhill(Wheel):
         return part_lost * (1.0 - 2.0 * r_P_i[0]), 0.0
 
 
-def wheel(type_, v=1.0, **fields):
+def scene_on_wheel(type_, v=1.0, **fields):
     """A solid ball of a type of contact of one's own that rolls along x."""
     scene = dap.Scene(name="wheel")
     scene.add_body("wheel", mass=M, Jp=[I] * 3, r=[0, 0, R], r_dot=[v, 0, 0], w=[0, v / R, 0])
     scene.add_contact(type_.keyword, "c", P_i="wheel.O", radius=R, mu=0.8, **fields)
     scene.add_force("weight", "gravity", gravity=G)
-    return dap.compile(scene, registry=registry_of(type_))
+    return scene
+
+
+def wheel(type_, v=1.0, **fields):
+    """The same, compiled."""
+    return dap.compile(scene_on_wheel(type_, v, **fields), registry=registry_of(type_))
 
 
 @pytest.mark.parametrize(("contact", "limit"), [("events", 1e-9), ("stepping", 1e-6)])

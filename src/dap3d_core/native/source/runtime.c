@@ -412,7 +412,7 @@ static int let_jump(dap3d_model *m, const double *crossing, const double *sides,
 #endif
 
 #if CONTACTS
-enum { PRESCRIBED = 1, JAMMED, OVERLAPS, DRIVES, ENDLESS, SLOWLY };
+enum { PRESCRIBED = 1, JAMMED, OVERLAPS, PUSHES, ENDLESS, SLOWLY };
 
 /* Let switches of contacts be on the side of what goes on. */
 static void go_on(dap3d_model *m, double *sides)
