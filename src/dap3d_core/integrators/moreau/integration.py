@@ -17,6 +17,7 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
+from dap3d_core.formulations.contacts.contact_table import words_of_drive
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators.moreau.arrays import all_room, grown
 from dap3d_core.integrators.moreau.contact_set import POINTS
@@ -174,6 +175,12 @@ class MoreauIntegration(Integration):
             f"{PART * MOST_PARTS / h:.2g} 1/s; let a joint do what so stiff a spring or damper "
             "does, give a shorter contact_step, or make it less stiff"
         )
+
+    @property
+    def driving(self) -> str:
+        """As of ``Integration``."""
+        s, names = self._arrays, self._evaluator.model.contact_names
+        return f"contact {words_of_drive(names[s.driving], s.grip[s.driving])}"
 
     @property
     def shortened(self) -> str:

@@ -38,6 +38,7 @@ from dap3d_core.integrators.moreau.newton import product_of, speed_of
 from dap3d_core.integrators.moreau.problem import NEAR, prepare_problem, solve
 from dap3d_core.integrators.moreau.restitution import OVERLAP, limit_bounces, put_bias
 from dap3d_core.integrators.stepping.integration_state import (
+    DRIVEN,
     NO_ROOM,
     NOT_FINITE,
     OTHER,
@@ -94,7 +95,7 @@ def advance(
                 return
         if s.stage == FREE:
             if not meet(work, s, system, loops):
-                break
+                break  # with a status, or for room
             if s.is_solved != 0:
                 carry_on(work, s)
             s.stage = MOVED
@@ -168,8 +169,9 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     if s.declared_gap.size == 0 and s.y.size > 0:
         evaluate_rows(work.t, y, s, system, loops)
     any_collides = put_bias(s)
-    if s.declared_law.size > 0:
-        find_grips(work.t, s, system, loops)
+    if s.declared_law.size > 0 and not find_grips(work.t, s, system, loops):
+        work.t_stop, work.status, s.stage = work.t, DRIVEN, 0
+        return False
     order_memory(work.memory, s.slots)
     if stay_closed(work, s) and not turn_rows(
         work.t + 0.5 * s.h, put_middle(work, s), s, system, loops
