@@ -19,7 +19,7 @@ from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, V, 
 from dap3d_core.native.run.directions import Directions, PairEntry, PairUnit
 from dap3d_core.native.run.elements import Elements
 from dap3d_core.native.run.outputs import Output
-from dap3d_core.native.run.prepared import Advance, ContactCode, JumpCode, PreparedRun
+from dap3d_core.native.run.prepared import Advance, ContactCode, PreparedRun
 from dap3d_core.simulation.events import contact_jumps
 from dap3d_core.study.batch import initial_state
 
@@ -114,7 +114,9 @@ def units_of(prepared: PreparedRun, directions: Directions | None) -> dict[Unit 
     entries: list[Entry | PairEntry] = list(prepared.image.functions.values())
     for one in prepared.advances:
         entries += [one.entry] if one.completes is None else [one.entry, one.completes]
-    rare: list[Entry | PairEntry] = [prepared.jumps.entry] if prepared.jumps else []
+    law = prepared.jumps
+    rare: list[Entry | PairEntry] = [law.entry] if law else []
+    rare += [law.follows] if isinstance(law, ContactCode) and law.follows else []
     rare += directions.entries if directions else []
     found = {entry.unit.name: (entry.unit, False) for entry in rare}
     found |= {entry.unit.name: (entry.unit, True) for entry in entries}
@@ -306,7 +308,7 @@ def _jumps(prepared: PreparedRun) -> list[str]:
         "ELEMENTS": j.acting.size,
         "DOES_JUMP": place(j.jumps),
     }
-    return [*_defined(numbers), *_law("void", "jump_law", law, place)]
+    return [*_defined(numbers), *_law("void", "jump_law", law.entry, law.arguments, place)]
 
 
 def _contacts(law: ContactCode, place: Callable[[Any], int]) -> list[str]:
@@ -319,16 +321,17 @@ def _contacts(law: ContactCode, place: Callable[[Any], int]) -> list[str]:
     return [
         *_defined(numbers),
         *_table("static const char *const contact_names[]", map(c_text, law.names)),
-        *_law("int64_t", "contact_law", law, place),
+        *_law("int64_t", "contact_law", law.entry, law.arguments, place),
+        *(_law("void", "follow_drivers", law.follows, law.arguments[:3], place) if law.follows else []),
     ]
 
 
 def _law(
-    result: str, name: str, law: JumpCode | ContactCode, place: Callable[[Any], int]
+    result: str, name: str, entry: Entry, arguments: Sequence[Any], place: Callable[[Any], int]
 ) -> list[str]:
-    """A C function that calls a law on the arrays of a run."""
-    symbol, types = symbol_of(law.entry), ", ".join(["void *"] * len(law.arguments))
-    given = ", ".join(f"w + {place(part)}" for part in law.arguments)
+    """A C function that calls a function of time on the arrays of a run."""
+    symbol, types = symbol_of(entry), ", ".join(["void *"] * len(arguments))
+    given = ", ".join(f"w + {place(part)}" for part in arguments)
     call = f"{'' if result == 'void' else 'return '}{symbol}(t, {given})"
     return [
         f"{result} {symbol}(double, {types});",
