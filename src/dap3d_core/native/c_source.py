@@ -111,11 +111,13 @@ def symbol_of(entry: Entry | PairEntry) -> str:
 
 def units_of(prepared: PreparedRun, directions: Directions | None) -> dict[Unit | PairUnit, bool]:
     """The units of compiled code that a run calls, and whether its steps do."""
-    entries: list[Entry | PairEntry] = list(prepared.image.functions.values())
+    image, start = prepared.image, prepared.start
+    rare: list[Entry | PairEntry] = [*start.functions.entries] if start else []
+    entries: list[Entry | PairEntry] = [e for e in image.functions.values() if e not in rare]
     for one in prepared.advances:
         entries += [one.entry] if one.completes is None else [one.entry, one.completes]
     law = prepared.jumps
-    rare: list[Entry | PairEntry] = [law.entry] if law else []
+    rare += [law.entry] if law else []
     rare += [law.follows] if isinstance(law, ContactCode) and law.follows else []
     rare += directions.entries if directions else []
     found = {entry.unit.name: (entry.unit, False) for entry in rare}

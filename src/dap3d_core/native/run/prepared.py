@@ -259,7 +259,6 @@ class PreparedRun:
         t_end: s, by default.
         advances: the integration that it begins with; for "auto" the implicit one as well.
         jumps: the law of jumps, or what contacts do at events; None where velocities do not jump.
-        start: how it starts; None where Python alone finds that.
     """
 
     def __init__(
@@ -303,8 +302,8 @@ class PreparedRun:
                 second.compile()
                 integrations.append(second)
         self.advances = [Advance.of(one) for one in integrations]
-        is_singular = run.singular is not None
-        self.start = None if is_singular else StartCode.of(self.evaluator, run.settings)
+        #: False where no parameter asks for another start: its code is left out.
+        self.may_start_anew = run.singular is None
         #: Arrays and tables besides: of outputs.
         self.more: list[Any] = []
 
@@ -316,6 +315,12 @@ class PreparedRun:
         parts += [] if self.jumps is None else [*self.jumps.arguments]
         parts += [] if self.start is None else [self.start.arrays, self.start.functions]
         return Image(self.evaluator.loops, *parts, *self.more)
+
+    @cached_property
+    def start(self) -> StartCode | None:
+        """How it starts; None where Python alone finds that, or nothing asks for it."""
+        settings = self.run.settings
+        return StartCode.of(self.evaluator, settings) if self.may_start_anew else None
 
     @property
     def steps_contacts(self) -> bool:
