@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.assembly.metric import METRIC_WIDTH
+from dap3d_core.formulations import REPORT
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.jumps.jump_arrays import CROSSING, SIDE, JumpArrays
 from dap3d_core.integrators.stepping import integration_state as at
@@ -184,6 +185,9 @@ def _numbers(prepared: PreparedRun, variables: Sequence[Variable]) -> list[str]:
         "INTEGRATIONS": len(prepared.advances),
         "STOPS": len(prepared.stops),
         "FUNCTIONS": image.at(prepared.functions),
+        "REPORT_CODE": symbol_of(prepared.functions.entries[REPORT]),
+        # the iteration for forces on reactions begins with what was reported last
+        "REPORTS": int(bool(prepared.evaluator.model.iterated_forces or prepared.jumps)),
         "SYSTEM": image.at(system),
         "LOOPS": image.at(prepared.evaluator.loops),
         "BODIES": image.at(system.body),

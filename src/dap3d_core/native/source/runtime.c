@@ -6,6 +6,7 @@
    the same bits. */
 
 #define DAP3D_BUILD
+#include <float.h>
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -66,8 +67,16 @@ static double *y_of(dap3d_model *m) { return numbers(m, integrations[m->which].s
 
 static void call(dap3d_model *m, int k, double t, const double *y, double *out, int64_t size)
 {
-    function f = (function)(uintptr_t)m->w[FUNCTIONS + k];
+    function f = k == REPORT ? (function)REPORT_CODE : (function)(uintptr_t)m->w[FUNCTIONS + k];
     f(t, y, STATES, out, size, m->w + SYSTEM, m->w + LOOPS);
+}
+
+/* In place of a report, where integrations write rows: outputs have one where they are asked for. */
+static void leave_out(double t, const double *y, int64_t states, double *out, int64_t size,
+                      void *system, void *loops)
+{
+    (void)t, (void)y, (void)states, (void)system, (void)loops;
+    memset(out, 0, 8 * (size_t)size);
 }
 
 /* Fill in the addresses of a run's memory, which has moved. */
@@ -77,6 +86,8 @@ static void place(dap3d_model *m)
         m->w[addresses[k][0]] = (int64_t)(uintptr_t)(m->w + addresses[k][1]);
     for (size_t k = 0; k < sizeof codes / sizeof *codes; k++)
         m->w[codes[k].word] = (int64_t)(uintptr_t)codes[k].code;
+    if (!REPORTS)
+        m->w[FUNCTIONS + REPORT] = (int64_t)(uintptr_t)leave_out;
 }
 
 static int fail(dap3d_model *m, int result, const char *words)
@@ -200,6 +211,11 @@ static void report(dap3d_model *m)
 #if COMPLETES
     complete(m->w, m->row);
 #endif
+    for (int k = 0; k < ROW; k++)
+        if (!(fabs(m->row[k]) <= DBL_MAX)) { /* the next step says so */
+            integer_of(m)[I_status] = NOT_FINITE;
+            real_of(m)[R_t_stop] = m->t;
+        }
     call_elements(m);
     dap3d_outputs(numbers(m, BODIES), m->row + 1, numbers(m, VALUES),
                   numbers(m, VALUES_OF_ELEMENTS), m->outputs);
