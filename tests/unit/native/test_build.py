@@ -1,9 +1,11 @@
 """Exported libraries by themselves: without Python, in threads, on other platforms."""
 
+import os
 import shutil
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 from support.binaries import macho_names, pe_names
 
@@ -193,3 +195,28 @@ def test_libraries_of_other_platforms_are_linked_here(tmp_path, platform, begin)
     assert all(name.startswith("dap3d_") for name in names)
     assert "dap3d_outputs" not in names
     assert (made.path / platform / "libpen1.a").exists()
+
+
+@pytest.mark.slow  # the C library of Windows is made first, some minutes
+def test_a_program_for_windows_prints_under_wine_what_one_for_linux_does(tmp_path):
+    """Equal but for the last bits of sines and cosines, of which each C library has its own."""
+    pytest.importorskip("ziglang")
+    wine = shutil.which("wine64") or shutil.which("wine")
+    if wine is None:
+        pytest.skip("there is no wine")
+    made = exported(tmp_path, platforms=[own_platform(), "windows"])
+    tables = []
+    for name in made.platforms:
+        zig, program = build.PLATFORMS[name].zig, tmp_path / f"{name}.exe"
+        given = "-DDAP3D_STATIC", made.path / "example.c", made.path / name / "libpen1.a"
+        command = [sys.executable, "-m", "ziglang", "cc", "-target", zig, *given, "-lm", "-o"]
+        subprocess.run([*command, program], check=True)
+        loader = [wine] if name.startswith("windows") else []
+        prefix = os.environ | {"WINEPREFIX": str(tmp_path / "wine"), "WINEDEBUG": "-all"}
+        done = subprocess.run([*loader, program, "0.5", "10"], env=prefix, capture_output=True,
+                              text=True, check=True)  # fmt: skip
+        tables.append([line.split(",") for line in done.stdout.splitlines()])
+    (head, *rows), (names, *found) = tables
+    assert names == head
+    # rounding of numbers up to 10, in some 100 steps
+    np.testing.assert_allclose(np.array(found, float), np.array(rows, float), rtol=0, atol=1e-12)
