@@ -18,14 +18,6 @@ from dap3d_core.cli.process.exit_codes import Refused, Terminated
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.pivots import near_singular_rows, store_reference_pivots
 from dap3d_core.formulations.programs import change_over, scene_program
-from dap3d_core.formulations.programs.scene_program import (
-    BEHIND,
-    constant_numbers,
-    constant_parts,
-    load_programs,
-    write_program,
-    write_programs,
-)
 from dap3d_core.integrators.radau.integration import RadauIntegration
 from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.stepping.integration import Refusals, off_constraints
@@ -71,7 +63,6 @@ from dap3d_core.kernels.compiler.types import (
     Table,
     Tuple,
 )
-from dap3d_core.kernels.compiler.units import Entry, Functions, Unit, address_of, type_of
 from dap3d_core.kernels.runtime import ready
 from dap3d_core.kernels.runtime.array_struct import INTEGERS, MATRIX, VECTOR, Arrays, pointer
 from dap3d_core.kernels.runtime.cache import Compiled, compiled, distrust, jit_is_on

@@ -28,19 +28,16 @@ from support.internals import (
     Arrays,
     Compiled,
     CompileError,
-    Entry,
-    Functions,
     Known,
     Program,
     Signature,
     Table,
     Tuple,
-    address_of,
     array_members,
     differentiate,
     pointer,
     trace,
-    type_of,
+    units,
 )
 
 #: The calls of a function that are recorded in each scene, from 1: early ones and some later ones.
@@ -158,7 +155,7 @@ def compiled_type(value, parameter):
         return Tuple(tuple(map(Known, value)))
     if isinstance(value, complex):
         return COMPLEX
-    type_ = type_of(value)
+    type_ = units.type_of(value)
     return FLOAT if type_ == INT and parameter.annotation is float else type_
 
 
@@ -239,7 +236,7 @@ def differences(calls, levels=None):
                     signatures[items[item]] = program.export(
                         item, table.signature.arguments, items[item]
                     )
-                elif isinstance(item, Entry):  # a differentiated loop, compiled as it is
+                elif isinstance(item, units.Entry):  # a differentiated loop, compiled as it is
                     items[id(item)] = item, dict.fromkeys((*targets(), DIFFERENTIATED), item)
                 elif not isinstance(item, Compiled) and id(item) not in items:
                     made = made_at(loop_text(item), {"loop": LOOP}, levels)
@@ -250,7 +247,7 @@ def differences(calls, levels=None):
         def compiled_table(table, level=level, entries=entries):
             made = (entries[items[f]] if isinstance(f, Compiled) else items[id(f)][1][level]
                     for f in table)  # fmt: skip
-            return Functions(table.signature, list(made))
+            return units.Functions(table.signature, list(made))
 
         for function, before, after, result in calls:
             symbol, signature, variable = wrappers[function, tuple(map(kind, before))]
@@ -285,7 +282,7 @@ def is_by_array(value, type_):
 def computes_values_alone(function, arguments):
     """Whether a function calls loops that are differentiated already, or may."""
     if function.__name__ == "call_loop":
-        return isinstance(arguments[0][arguments[1]], Entry)
+        return isinstance(arguments[0][arguments[1]], units.Entry)
     of_steps = function.__module__.endswith("radau.step")
     return function.__name__ in OF_TANGENTS or (of_steps and "tangents" in named(function))
 
@@ -323,7 +320,7 @@ def call_differentiated(entry, arguments):
             if own and value.size:
                 slopes = holder.slopes(value)
                 slopes[:] = rng.standard_normal(slopes.shape)
-            address = address_of(holder.matrix(value) if own else value)
+            address = units.address_of(holder.matrix(value) if own else value)
             return [address, *value.shape[: type_.ndim]]
         if isinstance(value, Arrays):
             return [carried.wide(value).address]

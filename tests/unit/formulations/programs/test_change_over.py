@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.internals import BEHIND, change_over, scene_program
+from support.internals import change_over, scene_program
 from support.plain import jit_is_on
 
 import dap3d_core as dap
@@ -56,7 +56,7 @@ def test_bits_are_those_of_general_code(model, method, at_once):
         assert_same(result, general(model, method=method))
     found = programs(at_once)
     assert found[RHS].failures() == 0
-    assert set(found) - {REPORT} in ({RHS}, {RHS, PROJECT, BEHIND})
+    assert set(found) - {REPORT} in ({RHS}, {RHS, PROJECT, scene_program.BEHIND})
 
 
 @pytest.mark.every(2)
@@ -75,7 +75,7 @@ def test_many_reports_have_a_program(model, method, at_once):
 def test_switches_have_programs(at_once):
     """A tricycle watches whether its disks lie."""
     assert_same(dap.simulate("tri", **SETTINGS), general("tri"))
-    assert set(programs(at_once)) == {RHS, PROJECT, BEHIND, WATCH}
+    assert set(programs(at_once)) == {RHS, PROJECT, scene_program.BEHIND, WATCH}
 
 
 def sliding_rod():
@@ -203,7 +203,7 @@ def test_a_program_whose_guards_fail_is_given_up(at_once, monkeypatch):
 def test_two_threads_give_up_one_projection_once():
     """What reads the right-hand side's factors never stands behind a program of that."""
     rhs, project, behind = ("rhs",), ("project",), ("behind",)
-    programs = {RHS: rhs, PROJECT: project, BEHIND: behind}
+    programs = {RHS: rhs, PROJECT: project, scene_program.BEHIND: behind}
     record = change_over.Record(programs, anew=(0.0, np.zeros(1)))
     for _ in range(2):
         change_over._give_up(record, project, PROJECT, record.anew)

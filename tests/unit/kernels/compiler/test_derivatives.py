@@ -19,7 +19,7 @@ from support.internals import (
     Program,
     compiled,
     pointer,
-    type_of,
+    units,
 )
 from support.plain import jit_is_on
 from support.structs import Inner, Numbers
@@ -27,7 +27,6 @@ from support.structs import Inner, Numbers
 from dap3d_core.kernels import scalar_math
 from dap3d_core.kernels.compiler.derivatives import differentiate
 from dap3d_core.kernels.runtime.lanes import DifferentiatedArrays, differentiated
-from dap3d_core.kernels.scalar_math import is_differentiated, values_alone, with_slopes
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 
@@ -79,14 +78,14 @@ def with_corners(numbers):
 @compiled
 def with_remarks(numbers):
     x, out = numbers.x, numbers.out
-    out[0] = with_slopes(x[0], x[1] * x[2])
-    out[1] = with_slopes(x[0], 0.0)
-    out[2] = 2.0 if is_differentiated() else 1.0
+    out[0] = scalar_math.with_slopes(x[0], x[1] * x[2])
+    out[1] = scalar_math.with_slopes(x[0], 0.0)
+    out[2] = 2.0 if scalar_math.is_differentiated() else 1.0
 
 
 @compiled
 def norm(numbers):
-    values_alone()
+    scalar_math.values_alone()
     x, out = numbers.x, numbers.out
     largest = 0.0
     for k in range(3):
@@ -118,7 +117,7 @@ def differentiated_run(function, one, directions):
     wide = DifferentiatedArrays(one, 1 + directions.shape[1])
     wide.slopes(one.x)[:] = directions
     wide.slopes(one.inner.table)[:] = np.repeat(directions, 2, axis=0)
-    entry = differentiated(function.compile([type_of(one)]), 1 + directions.shape[1])
+    entry = differentiated(function.compile([units.type_of(one)]), 1 + directions.shape[1])
     entry(wide)
     wide.give()
     return one.out.copy(), wide.slopes(one.out).copy()
