@@ -14,8 +14,6 @@ import attrs
 import numpy as np
 
 from dap3d_core.kernels.runtime import cache
-from dap3d_core.kernels.runtime.lanes import Differentiation
-from dap3d_core.kernels.runtime.source_digest import COMPILED_LAYERS
 from support.at_all_levels import all_made_of, function_of, same_bits, targets
 from support.internals import (
     COMPLEX,
@@ -28,6 +26,7 @@ from support.internals import (
     Arrays,
     Compiled,
     CompileError,
+    Differentiation,
     Known,
     Program,
     Signature,
@@ -36,6 +35,7 @@ from support.internals import (
     array_members,
     differentiate,
     pointer,
+    source_digest,
     trace,
     units,
 )
@@ -103,7 +103,7 @@ class Recorder:
 
 def all_compiled_functions():
     """The compiled functions of the core's floors."""
-    for floor in COMPILED_LAYERS:
+    for floor in source_digest.COMPILED_LAYERS:
         package = importlib.import_module(f"dap3d_core.{floor}")
         for info in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
             module = importlib.import_module(info.name)

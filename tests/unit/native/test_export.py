@@ -7,12 +7,11 @@ from functools import partial
 import attrs
 import numpy as np
 import pytest
-from support.internals import placed_shapes
+from support.internals import contact_jumps, placed_shapes
 
 import dap3d_core as dap
 from dap3d_core.integrators.moreau import arrays
 from dap3d_core.native.build import own_platform
-from dap3d_core.simulation.events import contact_jumps
 
 SPRING = """
 [scene]

@@ -7,7 +7,6 @@ from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.formulations import PROJECT, REPORT, RHS, WATCH
-from dap3d_core.formulations.programs.change_over import ChangeOver
 from dap3d_core.integrators import EXPLICIT
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
@@ -147,9 +146,9 @@ def test_controllers_run_by_programs(at_once):
 @pytest.mark.parametrize("record", [None, change_over.Record()])
 def test_a_call_that_needs_programs_is_not_made_without_them(record, monkeypatch):
     """Also where another thread has just given them up."""
-    monkeypatch.setattr(ChangeOver, "_record_of", lambda self, modes, start: record)
+    monkeypatch.setattr(change_over.ChangeOver, "_record_of", lambda self, modes, start: record)
     calls, addresses = [], np.zeros(2, dtype=np.int64)
-    call = ChangeOver(dap.compile("pen1").evaluator).call
+    call = change_over.ChangeOver(dap.compile("pen1").evaluator).call
     given = addresses, lambda: (0.0, np.zeros(0)), lambda: (0, 0, 0)
     call(lambda: calls.append("needed"), *given, needs_programs=True)
     call(lambda: calls.append("not needed"), *given)
@@ -180,7 +179,7 @@ def test_numbers_that_change_in_a_run_stop_the_program(at_once):
         return advance(budget)
 
     integration.advance = advanced
-    programs = ChangeOver(evaluator)
+    programs = change_over.ChangeOver(evaluator)
     programs.during(integration, lambda: integration.advance(1))
     assert np.array_equal(addresses, before)
     evaluator.system.par[0] += 1e-3

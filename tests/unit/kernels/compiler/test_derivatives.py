@@ -16,8 +16,10 @@ from support.internals import (
     MATRIX,
     Arrays,
     CompileError,
+    DifferentiatedArrays,
     Program,
     compiled,
+    differentiated,
     pointer,
     units,
 )
@@ -26,7 +28,6 @@ from support.structs import Inner, Numbers
 
 from dap3d_core.kernels import scalar_math
 from dap3d_core.kernels.compiler.derivatives import differentiate
-from dap3d_core.kernels.runtime.lanes import DifferentiatedArrays, differentiated
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 

@@ -7,14 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.graphs import GRAPHS, RANDOM, Case, chain, check_solution, star
-from support.internals import make_plan
+from support.internals import make_plan, rank
 from support.nets import fourbars, ladder, plate_net, rod_net
 from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.linear.ldlt import plan
 from dap3d_core.linear.ordering import elimination_order, ordering
-from dap3d_core.linear.rank import rank
 
 EPS = np.finfo(float).eps
 

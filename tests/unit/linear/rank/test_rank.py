@@ -12,9 +12,8 @@ from support.graphs import (
     two_wheels,
     wheel,
 )
+from support.internals import rank
 from support.plain import long_in_plain_python
-
-from dap3d_core.linear.rank import rank
 
 REDUNDANT = {
     "two hinges": lambda rng: (2, [((1, 0), 5), ((2, 1), 5), ((1, 2), 4)]),

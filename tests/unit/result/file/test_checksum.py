@@ -7,10 +7,10 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray
+from support.internals import checksum
 from support.results import circling, grown, same_bits
 
 from dap3d_core.result import ResultError, open_result
-from dap3d_core.result.file import checksum
 
 SIZE = 40
 REFUSED = r"cannot read .*: it is (damaged|cut off).*; take another copy of it, or run again$"

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.internals import split
+from support.internals import redundancy, split
 from support.mechanisms import bent_chain, door, planar_four_bar, rough_four_bar, torn, two_motors
 from support.own_types import registry_of
 
@@ -11,7 +11,6 @@ from dap3d_core.interface import Function, Joint, Vector2, number, vector2
 from dap3d_core.kernels import cross, dot, neg, row, scale, sqrt, where
 from dap3d_core.result import Note
 from dap3d_core.simulation.initial import assemble, least_change
-from dap3d_core.simulation.redundancy import redundancy
 
 
 def corrected(scene, **options):

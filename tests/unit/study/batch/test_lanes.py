@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from support import mechanisms, trees
-from support.internals import JP, change_over, scene_program
+from support.internals import JP, METRIC_CONSTANTS, change_over, scene_program
 from support.on_axles import driven, stone, wheel
 from support.plain import jit_is_on
 from support.state_types import stated
@@ -12,7 +12,6 @@ from unit.study.batch.test_batch import DONE, ensemble, path_of, singly
 from unit.study.batch.test_batch import pendulum as ball_pendulum
 
 import dap3d_core as dap
-from dap3d_core.assembly.metric import METRIC_CONSTANTS
 from dap3d_core.study import Ensemble
 from dap3d_core.study.batch import compiled_batch
 from dap3d_core.study.batch import lanes as study_lanes

@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.internals import checksum, is_sweep
 from support.plain import long_in_plain_python
 from unit.result.file.test_checksum import REFUSED, SIZE, changed_files, no_library, written
 from unit.study.sweep.test_sweep import spring
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError
-from dap3d_core.result.file import checksum
 from dap3d_core.study.sweep import file as sweep_file
-from dap3d_core.study.sweep.dataset import is_sweep
 
 __all__ = ["no_library"]  # a fixture
 ASKED = {"vary": {"forces.spring.k": [1.0, 4.0]}, "outputs": "block.r.x", "t_end": 0.1}

@@ -7,12 +7,12 @@ import attrs
 import numpy as np
 import pytest
 import xarray
+from support.internals import free_space
 from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.cli.console import sweep_tables
 from dap3d_core.result import ResultError, current_versions
-from dap3d_core.simulation.output import free_space
 from dap3d_core.study.sweep import file as growing
 from dap3d_core.study.sweep import sweep
 
