@@ -216,14 +216,28 @@ def exported(program, function, before, index):
     return symbol, signature, variable
 
 
-def differences(calls, levels=None):
+class Translated:
+    """What is translated of recorded calls: each function once, whatever is compared of it."""
+
+    def __init__(self):
+        self.program, self.signatures = Program(), {}
+        #: Of calls by function and kinds of arguments: what ``exported`` returns.
+        self.wrappers = {}
+        #: Symbols of the compiled functions that stand in tables.
+        self.items = {}
+
+
+def differences(calls, levels=None, translated=None):
     """Recorded calls that compiled code answers in other bits: functions and levels.
 
     Args:
         calls: of a recorder.
         levels: some of ``targets``; all where it is None.
+        translated: what other comparisons have translated, which is not done again.
     """
-    program, wrappers, signatures, items = Program(), {}, {}, {}
+    translated = translated or Translated()
+    program, wrappers = translated.program, translated.wrappers
+    signatures, items, loops = translated.signatures, translated.items, {}
     for function, before, _, _ in calls:
         key = function, tuple(map(kind, before))
         if key not in wrappers:
@@ -237,15 +251,15 @@ def differences(calls, levels=None):
                         item, table.signature.arguments, items[item]
                     )
                 elif isinstance(item, units.Entry):  # a differentiated loop, compiled as it is
-                    items[id(item)] = item, dict.fromkeys((*targets(), DIFFERENTIATED), item)
-                elif not isinstance(item, Compiled) and id(item) not in items:
+                    loops[id(item)] = item, dict.fromkeys((*targets(), DIFFERENTIATED), item)
+                elif not isinstance(item, Compiled) and id(item) not in loops:
                     made = made_at(loop_text(item), {"loop": LOOP}, levels)
-                    items[id(item)] = item, {level: e["loop"] for level, e in made.items()}
+                    loops[id(item)] = item, {level: e["loop"] for level, e in made.items()}
     found = set()
     for level, entries in made_at(program.module(), signatures, levels).items():
 
         def compiled_table(table, level=level, entries=entries):
-            made = (entries[items[f]] if isinstance(f, Compiled) else items[id(f)][1][level]
+            made = (entries[items[f]] if isinstance(f, Compiled) else loops[id(f)][1][level]
                     for f in table)  # fmt: skip
             return units.Functions(table.signature, list(made))
 
