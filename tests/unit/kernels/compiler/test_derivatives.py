@@ -16,24 +16,18 @@ from support.internals import (
     MATRIX,
     Arrays,
     CompileError,
+    DifferentiatedArrays,
     Program,
     compiled,
+    differentiated,
     pointer,
-    type_of,
+    units,
 )
 from support.plain import jit_is_on
 from support.structs import Inner, Numbers
 
 from dap3d_core.kernels import scalar_math
 from dap3d_core.kernels.compiler.derivatives import differentiate
-from dap3d_core.kernels.runtime.lanes import DifferentiatedArrays, differentiated
-from dap3d_core.kernels.scalar_math import (
-    is_differentiated,
-    slope,
-    slope_count,
-    values_alone,
-    with_slopes,
-)
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 
@@ -85,17 +79,17 @@ def with_corners(numbers):
 @compiled
 def with_remarks(numbers):
     x, out = numbers.x, numbers.out
-    out[0] = with_slopes(x[0], x[1] * x[2])
-    out[1] = with_slopes(x[0], 0.0)
-    out[2] = 2.0 if is_differentiated() else 1.0
+    out[0] = scalar_math.with_slopes(x[0], x[1] * x[2])
+    out[1] = scalar_math.with_slopes(x[0], 0.0)
+    out[2] = 2.0 if scalar_math.is_differentiated() else 1.0
     product = x[1] * x[2]
-    for k in range(slope_count()):
-        out[3 + k] = slope(product, k)
+    for k in range(scalar_math.slope_count()):
+        out[3 + k] = scalar_math.slope(product, k)
 
 
 @compiled
 def norm(numbers):
-    values_alone()
+    scalar_math.values_alone()
     x, out = numbers.x, numbers.out
     largest = 0.0
     for k in range(3):
@@ -127,7 +121,7 @@ def differentiated_run(function, one, directions):
     wide = DifferentiatedArrays(one, 1 + directions.shape[1])
     wide.slopes(one.x)[:] = directions
     wide.slopes(one.inner.table)[:] = np.repeat(directions, 2, axis=0)
-    entry = differentiated(function.compile([type_of(one)]), 1 + directions.shape[1])
+    entry = differentiated(function.compile([units.type_of(one)]), 1 + directions.shape[1])
     entry(wide)
     wide.give()
     return one.out.copy(), wide.slopes(one.out).copy()
