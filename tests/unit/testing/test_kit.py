@@ -4,19 +4,12 @@ import random
 
 import numpy as np
 import pytest
-from support.internals import rotation as rotation_of_a_model
 from support.internals import sampled_types
 from support.plain import jit_is_on
 
 from dap3d_core.interface import examine
 from dap3d_core.testing import check_type, checks_for
-from dap3d_core.testing.samples.random_state import (
-    BODIES,
-    Direction,
-    quaternion_product,
-    random_state,
-    rotation,
-)
+from dap3d_core.testing.samples.random_state import BODIES, Direction, random_state
 from dap3d_forces.weight import Weight
 from dap3d_functions.polynomial import Polynomial
 from dap3d_joints.spherical import Spherical
@@ -25,14 +18,6 @@ from dap3d_joints.universal import Universal
 
 def some_state(seed=3):
     return random_state(random.Random(seed), [True, False], grounded=True)
-
-
-def test_rotations_are_those_of_the_model():
-    """And the product of quaternions is that of their rotations."""
-    p, q = some_state(1).p, some_state(2).p
-    assert rotation(p) == pytest.approx(rotation_of_a_model(p), abs=1e-15)
-    both = rotation_of_a_model(quaternion_product(p, q))
-    assert both == pytest.approx(rotation(p) @ rotation(q), abs=1e-15)
 
 
 def test_rates_are_those_of_finite_moves():
