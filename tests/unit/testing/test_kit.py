@@ -32,19 +32,6 @@ def test_rates_are_those_of_finite_moves():
     assert state.table_rate(along)[:, :3] == pytest.approx(rate[:, :3], abs=1e-8)
 
 
-def test_a_common_rigid_motion_keeps_distances_and_their_rates():
-    """Of all bodies, ground's included, whatever is set in motion with them."""
-    state, q = some_state(), some_state(5).p[1]
-    moved = state.together(q, np.ones(3), np.array([1.0, 2.0, 3.0]), np.array([0.3, -0.2, 0.5]))
-
-    def distance(s, h=0.0):
-        return np.linalg.norm((s.r[1] + h * s.v[1]) - (s.r[3] + h * s.v[3]))
-
-    assert distance(moved) == pytest.approx(distance(state), rel=1e-14)
-    rates = [(distance(s, 1e-6) - distance(s, -1e-6)) / 2e-6 for s in (state, moved)]
-    assert rates[0] == pytest.approx(rates[1], abs=1e-8)
-
-
 def test_samples_on_the_manifold():
     """C = 0 and J v = nu there; the last pose has body j on ground, at rest."""
     (subject,) = sampled_types(examine(Universal), seed=1, poses=3)
