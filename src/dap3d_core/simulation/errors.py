@@ -27,7 +27,7 @@ def refuse_contacts(model: Any) -> None:
 
 
 def refuse_collisions(model: Any, what: str) -> None:
-    """Refuse what (a subject of a sentence) knows contacts, and not what steps alone can follow."""
+    """SimulationError where shapes collide or joints break; ``what``: what does not know that."""
     if model.collisions is not None:
         raise SimulationError(
             f"{what} does not take shapes that collide yet, and the scene has some "
@@ -38,7 +38,7 @@ def refuse_collisions(model: Any, what: str) -> None:
 
 
 def refuse_breaks(model: Any, what: str) -> None:
-    """SimulationError where joints may break, which ``what`` does not know."""
+    """SimulationError where joints break; ``what``: what does not know that."""
     for joint in model.breaks:
         raise SimulationError(
             f"{what} does not take joints that may break or hold at times yet, and the scene has "

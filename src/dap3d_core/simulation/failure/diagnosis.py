@@ -69,9 +69,11 @@ def _at(evaluator: Evaluator, t: float, y: Floats) -> str:
                 title = "contact" if group.type_info.type.is_contact else _title(kind)
                 return f"{title} {name} (type {group.keyword}) is {fault}"
     found = _jammed(evaluator, t, y) or _without_direction(evaluator, t, y)
-    if found := found or _singular(evaluator, t):
+    found = found or _singular(evaluator, t)
+    if found:
         return found
-    fault = _fault_of_bodies(evaluator, _rates(evaluator, t, y))  # though what acts on it is not
+    # too large, though all that acts on the body is not
+    fault = _fault_of_bodies(evaluator, _rates(evaluator, t, y))
     return f"the acceleration of body {fault}" if fault else ""
 
 
