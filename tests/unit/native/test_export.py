@@ -432,6 +432,7 @@ def test_a_name_that_is_no_identifier(tmp_path):
     assert library.name == "lib_4_gr_en.a"
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("jams", "said"), [(-1, "rattle: slip jams again and again"),
                                             (99, "change ever faster")])  # fmt: skip
 def test_a_run_whose_contacts_come_to_no_end_says_why(tmp_path, monkeypatch, jams, said):
