@@ -7,14 +7,13 @@ from functools import partial
 import attrs
 import numpy as np
 import pytest
-from support.internals import placed_shapes
+from support.internals import contact_jumps, placed_shapes
 from support.own_types import registry_of
 from verification.test_rolling_resistance import Wheel, scene_on_wheel
 
 import dap3d_core as dap
 from dap3d_core.integrators.moreau import arrays
 from dap3d_core.native.build import own_platform
-from dap3d_core.simulation.events import contact_jumps
 
 SPRING = """
 [scene]

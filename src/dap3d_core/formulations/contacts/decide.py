@@ -9,9 +9,8 @@ coordinates.
 
 from typing import Any
 
-from dap3d_core.assembly.arrays import System, velocity_offset
+from dap3d_core.assembly.arrays import System
 from dap3d_core.assembly.evaluate import place, place_states
-from dap3d_core.assembly.metric import in_body_axes
 from dap3d_core.formulations import REPORT
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.contacts.contact_table import (
@@ -34,6 +33,7 @@ from dap3d_core.formulations.contacts.rows import (
     put_feels,
     put_free,
     put_rows,
+    put_velocity,
     unscale,
 )
 from dap3d_core.formulations.switches import POSITION_ROUNDING
@@ -352,16 +352,12 @@ def put_roles(s: ContactArrays) -> None:
 @compiled
 def put_state(s: ContactArrays, system: System) -> None:
     """The state ``y`` from the instant on."""
-    y, n, work = s.y, system.body.shape[0] - 1, 0.0
-    for b in range(1, n + 1):
-        o, f, q = 6 * b - 6, velocity_offset(b, n), 7 * b - 7
+    y, work = s.y, 0.0
+    for b in range(1, system.body.shape[0]):
+        o, q = 6 * b - 6, 7 * b - 7
+        put_velocity(b, s, system)
         for k in range(3):
-            y[f + k] += s.v[o + k] - s.v_before[o + k]
             y[q + k] += s.moved[o + k]
-        w = in_body_axes(system.body[b], s.v[o + 3] - s.v_before[o + 3],
-                         s.v[o + 4] - s.v_before[o + 4],
-                         s.v[o + 5] - s.v_before[o + 5])  # fmt: skip
-        y[f + 3], y[f + 4], y[f + 5] = y[f + 3] + w[0], y[f + 4] + w[1], y[f + 5] + w[2]
         turn, e0, e1, e2, e3 = s.moved[o + 3 : o + 6], y[q + 3], y[q + 4], y[q + 5], y[q + 6]
         y[q + 3] -= 0.5 * (turn[0] * e1 + turn[1] * e2 + turn[2] * e3)
         y[q + 4] += 0.5 * (e0 * turn[0] + turn[1] * e3 - turn[2] * e2)

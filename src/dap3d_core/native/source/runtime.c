@@ -6,6 +6,7 @@
    the same bits. */
 
 #define DAP3D_BUILD
+#include <float.h>
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -66,8 +67,16 @@ static double *y_of(dap3d_model *m) { return numbers(m, integrations[m->which].s
 
 static void call(dap3d_model *m, int k, double t, const double *y, double *out, int64_t size)
 {
-    function f = (function)(uintptr_t)m->w[FUNCTIONS + k];
+    function f = k == REPORT ? (function)REPORT_CODE : (function)(uintptr_t)m->w[FUNCTIONS + k];
     f(t, y, STATES, out, size, m->w + SYSTEM, m->w + LOOPS);
+}
+
+/* In place of a report, where integrations write rows: outputs have one where they are asked for. */
+static void leave_out(double t, const double *y, int64_t states, double *out, int64_t size,
+                      void *system, void *loops)
+{
+    (void)t, (void)y, (void)states, (void)system, (void)loops;
+    memset(out, 0, 8 * (size_t)size);
 }
 
 /* Fill in the addresses of a run's memory, which has moved. */
@@ -77,6 +86,8 @@ static void place(dap3d_model *m)
         m->w[addresses[k][0]] = (int64_t)(uintptr_t)(m->w + addresses[k][1]);
     for (size_t k = 0; k < sizeof codes / sizeof *codes; k++)
         m->w[codes[k].word] = (int64_t)(uintptr_t)codes[k].code;
+    if (!REPORTS)
+        m->w[FUNCTIONS + REPORT] = (int64_t)(uintptr_t)leave_out;
 }
 
 static int fail(dap3d_model *m, int result, const char *words)
@@ -200,6 +211,11 @@ static void report(dap3d_model *m)
 #if COMPLETES
     complete(m->w, m->row);
 #endif
+    for (int k = 0; k < ROW; k++)
+        if (!(fabs(m->row[k]) <= DBL_MAX)) { /* the next step says so */
+            integer_of(m)[I_status] = NOT_FINITE;
+            real_of(m)[R_t_stop] = m->t;
+        }
     call_elements(m);
     dap3d_outputs(numbers(m, BODIES), m->row + 1, numbers(m, VALUES),
                   numbers(m, VALUES_OF_ELEMENTS), m->outputs);
@@ -421,11 +437,20 @@ static void go_on(dap3d_model *m, double *sides)
         sides[m->w[CONTACT_SWITCHES + k]] = 1.0;
 }
 
+/* As ContactJumps._go_on: the state that was decided on becomes that of the run. */
+static void take_decided(dap3d_model *m)
+{
+    double rates[STATES];
+    memcpy(y_of(m), numbers(m, CONTACT_Y), 8 * STATES);
+    restart(m);
+    go_on(m, numbers(m, integrations[m->which].sides));
+    call(m, RHS, real_of(m)[R_t], y_of(m), rates, STATES);
+}
+
 /* As ContactJumps._resolve: what contacts do at the present state, where switches have crossed, if
    any; whether that went well. */
 static int let_touch(dap3d_model *m, const double *crossing, int starts)
 {
-    double *y = numbers(m, CONTACT_Y), rates[STATES], t = real_of(m)[R_t];
     for (int c = 0; c < CONTACTS; c++)
         numbers(m, CONTACT_LIMIT)[c] =
             (starts ? TOUCHING_AT_START : TOUCHING) * numbers(m, CONTACT_LENGTH)[c] /
@@ -433,14 +458,11 @@ static int let_touch(dap3d_model *m, const double *crossing, int starts)
     for (int k = 0; k < 2 * CONTACTS; k++)
         m->w[CONTACT_ENDED + k] = crossing != NULL && crossing[m->w[CONTACT_SWITCHES + k]] != 0.0;
     m->w[CONTACT_INTEGER + CI_starts] = starts;
-    memcpy(y, y_of(m), 8 * STATES);
-    m->failure = contact_law(t, m->w);
+    memcpy(numbers(m, CONTACT_Y), y_of(m), 8 * STATES);
+    m->failure = contact_law(real_of(m)[R_t], m->w);
     if (m->failure)
         return 0;
-    memcpy(y_of(m), y, 8 * STATES);
-    restart(m);
-    go_on(m, numbers(m, integrations[m->which].sides));
-    call(m, RHS, t, y_of(m), rates, STATES);
+    take_decided(m);
     return 1;
 }
 
@@ -712,6 +734,7 @@ static int step_freely(dap3d_model *m, double t)
 
 /* ---------------------------------------------------------------------- holds of inputs */
 
+#if DRIVES && !CONTACTS
 static double kinetic_energy(dap3d_model *m)
 {
     double total = 0.0, report_of[ROW];
@@ -729,6 +752,8 @@ static double kinetic_energy(dap3d_model *m)
     return total;
 }
 
+#endif
+
 /* As Hold.jump and sampled.jump: inputs have changed. */
 static int jump(dap3d_model *m)
 {
@@ -743,12 +768,16 @@ static int jump(dap3d_model *m)
         if (integrations[m->which].keeps_step)
             real[R_h] = h;
     }
-    if (DRIVES) { /* velocities jump with a driver; what that takes is work */
-        double before = kinetic_energy(m);
-        if (!project(m))
-            return stopped(m);
-        y_of(m)[STATES - 1] += kinetic_energy(m) - before;
-    }
+#if DRIVES && CONTACTS /* as ContactJumps.set_state */
+    memcpy(numbers(m, CONTACT_Y), y_of(m), 8 * STATES);
+    follow_drivers(real[R_t], m->w);
+    take_decided(m);
+#elif DRIVES /* velocities jump with a driver; what that takes is work */
+    double before = kinetic_energy(m);
+    if (!project(m))
+        return stopped(m);
+    y_of(m)[STATES - 1] += kinetic_energy(m) - before;
+#endif
 #if CONTACTS
     if (!let_touch(m, NULL, 0)) { /* what touches lifts, slips or sticks by the forces that act then */
         integer[I_status] = JUMPED;
