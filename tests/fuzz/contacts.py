@@ -1,42 +1,54 @@
 """Random scenes that touch with friction go on, or end with one clear error.
-Of balls and boxes, half of them with a linkage as well, that has limits, stops and friction.
-An input is the number of a scene; from ``LEGS`` on a body stands on 2 to 4 legs that share it, and
-from ``RESISTING`` on the scenes fall that begin with zero, and resist rolling and spinning.
+An input is the number of a scene. Of balls and boxes, half of them with a linkage as well, that has
+limits, stops and friction; from ``LEGS`` on a body stands on 2 to 4 legs that share it; from
+``RESISTING`` on balls resist rolling and spinning; from ``VARIED`` on the scenes are those of
+varied_contacts.py, by several integrators and methods, with drivers and springs.
 Energy is never gained, nothing sinks in, all numbers are finite, and forces obey Newton's and
-Coulomb's laws, of which the scene alone says the numbers."""
+Coulomb's laws, of which the scene alone says the numbers. Some are run in another way as well."""
 
+import collections
 import time
 
 import numpy as np
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 from support.ended import EndedError
 
 import dap3d_core as dap
+from dap3d_core.formulations.programs import change_over
+from fuzz.varied_contacts import settings_of, varied_scene
 
-#: s simulated; s of CPU time after which a run hangs; settings.
-SPAN, HANG = 1.0, 60.0
-SETTINGS = {"t_end": SPAN, "dt": SPAN / 60, "rtol": 1e-10, "atol": 1e-12, "integrator": "dop853",
-            "contact": "events"}  # fmt: skip
+#: s simulated, and of varied scenes; s of CPU time after which a run hangs.
+SPAN, SHORT, HANG = 1.0, 0.3, 60.0
+SETTINGS = {"rtol": 1e-10, "atol": 1e-12, "integrator": "dop853", "contact": "events"}
 #: Gains of energy, and depths, as parts of energy and length of the scene. Where a run reports
-#: between events a gap is as good as the state.
-GAIN, DEPTH = 1e-9, 1e-9
+#: between events a gap is as good as the state: so many times its relative tolerance.
+GAIN, DEPTH, EXACT = 1e-9, 1e-9, 1e-10
 #: Words of the errors that a run may end with.
-ENDINGS = ("jams", "asks for steps as short")
+ENDINGS = ("jams", "rattle", "asks for steps as short")
 #: Number of the first scene of legs.
 LEGS = 10**6
-#: And of those that resist rolling; no legs, whose contacts may take turns then: ``auto`` steps.
-RESISTING = 2 * LEGS
+#: And of those that resist rolling; no legs or boxes, whose contacts may take turns then: ``auto``
+#: steps. And of those that touch early.
+RESISTING, VARIED = 2 * LEGS, 3 * LEGS
 #: Forces, N, and slips, m/s, that are rounding of such scenes: forces are some 1e2, of slips of 1.
 FORCE, SLIP = 1e-6, 1e-8
+#: One scene of so many runs by programs of its own, each of which takes seconds to make, and one
+#: is run in another way.
+WITH_PROGRAMS, COMPARED = 50, 10
+#: Part of the state by which two ways may differ behind an impact and some slip.
+SAME = 1e-5
 
 
 def numbers():
-    """Numbers of scenes."""
-    return st.integers(0, RESISTING + LEGS).map(lambda n: str(n).encode())
+    """Numbers of scenes: nine of ten are varied, the others take five times as long."""
+    return st.integers(0, 10 * VARIED - 1).map(lambda n: str(n).encode())
 
 
 def scene_of(number):
-    """1 to 4 contacts: balls and boxes that fall on a floor, balls on each other; or legs."""
+    """The scene of a number."""
+    if number >= VARIED:
+        return varied_scene(number)
     if number < RESISTING:
         return scene_on_legs(number) if number >= LEGS else scene_that_falls(number)
     scene = scene_that_falls(number - RESISTING)
@@ -87,8 +99,10 @@ def scene_that_falls(number):
 
 
 def add_resistance(scene, rng):
-    """What resists rolling and spinning at some of the contacts."""
+    """What resists rolling and spinning at some of the balls."""
     for contact in scene.contacts.values():
+        if contact.type == "box_plane":
+            continue
         lengths = rng.choice([0.0, 0.001, 0.02], size=2)
         contact.fields.update(mu_roll=float(lengths[0]), mu_spin=float(lengths[1]))
 
@@ -169,7 +183,7 @@ def scene_on_legs(number):
     return scene
 
 
-def check_laws(scene, contact, name):
+def check_laws(scene, contact, name, depth):
     """Complementarity and Coulomb's law of a contact of the scene, at all reported instants.
 
     Of what resists rolling or spinning the same of moments.
@@ -183,7 +197,7 @@ def check_laws(scene, contact, name):
     open_, slides, sticks = (contact.mode == k for k in range(3))
     assert np.all(N >= -FORCE), name
     assert np.all(size[open_] + np.abs(N[open_]) == 0.0), name
-    assert np.all(np.abs(contact.gap[~open_]) <= DEPTH), name
+    assert np.all(np.abs(contact.gap[~open_]) <= depth), name
     assert np.all(size[sticks] <= (fields.get("mu_s", mu) * N + rest)[sticks]), name
     assert np.all(slip[sticks] <= SLIP), name
     fast = slides & (slip > 1e3 * SLIP)
@@ -193,42 +207,92 @@ def check_laws(scene, contact, name):
 
 
 def check_newton(scene, result):
-    """Newton's law of a body on legs alone: weight, and what contacts say they push with."""
-    if not scene.name.startswith("legs") or len(scene.bodies) > 1 or "spring" in scene.forces:
+    """Newton's and Euler's laws of bodies that contacts and weight alone act on."""
+    held = {str(given).partition(".")[0] for one in (*scene.joints.values(), *scene.forces.values())
+            for given in one.fields.values()}  # fmt: skip
+    held |= {point.body for name, point in scene.points.items() if name in held}
+    if any("roll" in name or "spin" in name for name in result.contact_names):
         return
-    n = np.asarray(scene.vectors["n"].sp)
-    contacts = [result.contact(name) for name in result.contact_names if "_" not in name]
-    force = sum(c.normal_force[:, None] * n + c.friction for c in contacts)
-    left = scene.bodies["b"].mass * (result.rdd[:, 0] + [0.0, 0.0, 9.81]) - force
-    assert np.max(np.abs(left)) <= FORCE * (1.0 + np.max(np.abs(force)))
+    table, place = result.contacts, {t: k for k, t in enumerate(result.t)}
+    for b, (name, body) in enumerate(scene.bodies.items()):
+        if name in held:
+            continue
+        rows = table.of(name)
+        force, moment = np.zeros((2, len(result.t), 3))
+        at = np.array([place[t] for t in rows.t], dtype=int)
+        np.add.at(force, at, rows.force)
+        np.add.at(moment, at, np.cross(rows.point - result.r[at, b], rows.force))
+        left = body.mass * (result.rdd[:, b] + [0.0, 0.0, 9.81]) - force
+        assert np.max(np.abs(left)) <= FORCE * (1.0 + np.max(np.abs(force))), name
+        A = Rotation.from_quat(np.roll(result.p[:, b], -1, axis=-1)).as_matrix()
+        J = A * np.asarray(body.Jp) @ A.swapaxes(1, 2)
+        spin = np.einsum("tij,tj->ti", J, result.w[:, b])
+        left = np.einsum("tij,tj->ti", J, result.wd[:, b]) + np.cross(result.w[:, b], spin) - moment
+        assert np.max(np.abs(left)) <= FORCE * (1.0 + np.max(np.abs(force))), name
+
+
+def check_energy(scene, result, exact):
+    """No contact gives energy, nor does what is between them."""
+    energy = result.energy.total
+    size = np.max(np.abs(result.energy.kinetic)) + 9.81 * len(scene.bodies)
+    driven = any(joint.type.startswith("drive") for joint in scene.joints.values())
+    if not driven:
+        assert np.max(np.diff(energy), initial=0.0) <= GAIN * exact * size
+        work = collections.Counter()
+        for event in result.events:
+            work[event.t] += event.work
+        assert max(work.values(), default=0.0) <= GAIN * exact * size
+    assert result.ledger["energy"].ok
+
+
+def check_other_way(scene, result, given):
+    """As far as the second impact the same motion by another integrator, or method."""
+    impacts = [event.t for event in result.events if event.kind == "impact"][1:]
+    end = min(impacts, default=result.t[-1])
+    last = int(np.searchsorted(result.t, end, side="right")) - 1
+    if last < 1:
+        return
+    joint = given.get("method") != "joint" and not scene.joints
+    other = {"method": "joint", "integrator": "dop853"} if joint else {
+        "method": "lsq", "integrator": "radau" if given["integrator"] == "dop853" else "dop853"}  # fmt: skip
+    again = dap.simulate(scene, **(given | other | {"t_end": float(result.t[last])}))
+    size = 1.0 + np.max(np.abs(result.u[: last + 1]))
+    assert np.max(np.abs(again.u - result.u[: last + 1])) <= SAME * size
 
 
 def check_contacts(data: bytes) -> str:
     """How the run of a scene ended, in words."""
-    scene, began = scene_of(int(data)), time.process_time()
+    number, began = int(data), time.process_time()
+    scene, given, span = scene_of(number), SETTINGS, SPAN
+    if number >= VARIED:
+        given, span = SETTINGS | settings_of(number), SHORT
+    given, exact = given | {"t_end": span, "dt": span / 30}, given["rtol"] / EXACT
 
     def watch(_):
         if time.process_time() - began > HANG:
             raise EndedError
 
-    said = ""
+    said, most = "", change_over.MOST_BODIES
+    change_over.MOST_BODIES = 0 if number % WITH_PROGRAMS else most
     try:
-        result = dap.simulate(scene, watch=watch, **SETTINGS)
+        result = dap.simulate(scene, watch=watch, **given)
     except dap.SimulationError as error:
         said, result = str(error), error.result
+    finally:
+        change_over.MOST_BODIES = most
     names = result.contact_names if result else scene.contacts
     words = next((w for w in ENDINGS if w in said), "")
     assert not said or (words and any(name in said for name in names)), said
     if result is None:  # it jams where it begins
         return words
     assert np.isfinite(result.u).all()
-    energy = result.energy.total
-    size = np.max(np.abs(result.energy.kinetic)) + 9.81 * len(scene.bodies)
-    assert np.max(np.diff(energy), initial=0.0) <= GAIN * size
+    check_energy(scene, result, exact)
     for name in names:
         contact = result.contact(name)
-        assert np.min(contact.gap) >= -DEPTH, name
+        assert np.min(contact.gap) >= -DEPTH * exact, name
         if name.partition("#")[0].partition("_")[0] in scene.contacts:
-            check_laws(scene, contact, name)
+            check_laws(scene, contact, name, DEPTH * exact)
     check_newton(scene, result)
+    if number % COMPARED == 0:
+        check_other_way(scene, result, given)
     return words or "done"

@@ -301,11 +301,12 @@ def _completion(prepared: PreparedRun) -> list[str]:
     if one.completes is None:
         return ["#define COMPLETES 0"]
     symbol = symbol_of(one.completes)
-    given = ", ".join(f"w + {prepared.image.at(part)}" for part in one.arguments[:2])
+    types = ", ".join(["void *"] * len(one.arguments))
+    given = ", ".join(f"w + {prepared.image.at(part)}" for part in one.arguments)
     return [
         "#define COMPLETES 1",
         f"#define PUSHED {prepared.image.at(one.arguments[0].pushed)}",
-        f"void {symbol}(void *, void *, double *, int64_t);",
+        f"_Bool {symbol}({types}, double *, int64_t);",
         f"static void complete(int64_t *w, double *row) {{ {symbol}({given}, row, ROW); }}",
     ]
 

@@ -11,7 +11,6 @@ from support.binaries import macho_names, pe_names
 
 import dap3d_core as dap
 from dap3d_core.native import build
-from dap3d_core.native.build import own_platform
 
 THREADS = """
 #include <pthread.h>
@@ -86,7 +85,7 @@ def test_a_hundred_runs_in_eight_threads_are_clean_under_sanitizers(tmp_path, mo
         # the runtime as well as the program
         monkeypatch.setattr(build, "OPTIONS", (*options, f"-fsanitize={sanitizer}"))
         made = exported(tmp_path)
-        archive = made.path / own_platform() / "libpen1.a"
+        archive = made.path / build.own_platform() / "libpen1.a"
         program = tmp_path / sanitizer
         command = [compiler(), "-std=c11", "-g", f"-fsanitize={sanitizer}", "-DDAP3D_STATIC",
                    f"-I{made.path}", tmp_path / "threads.c", archive, "-lm", "-lpthread",
@@ -107,7 +106,7 @@ def test_it_runs_in_an_empty_root(tmp_path):
     made = exported(tmp_path)
     root = tmp_path / "root"
     root.mkdir()
-    archive = made.path / own_platform() / "libpen1.a"
+    archive = made.path / build.own_platform() / "libpen1.a"
     command = [compiler(), "-static", "-DDAP3D_STATIC", made.path / "example.c", archive, "-lm",
                "-o", root / "example"]  # fmt: skip
     if subprocess.run(command, capture_output=True, check=False).returncode:
@@ -132,7 +131,7 @@ def test_the_shared_library_needs_the_c_library_alone(tmp_path, optimised_librar
     run.step_to(0.5)
     result = dap.simulate("pen1", t_end=0.5, dt=0.5)
     assert [run[f"cone.r.{axis}"] for axis in "xyz"] == result.r[-1, 0].tolist()
-    library = made.path / own_platform() / "libpen1.so"
+    library = made.path / build.own_platform() / "libpen1.so"
     listed = subprocess.run(["readelf", "-dW", library], capture_output=True, text=True, check=True)
     needed = {line.split("[")[1].rstrip("]") for line in listed.stdout.splitlines()
               if "(NEEDED)" in line}  # fmt: skip
@@ -160,7 +159,7 @@ def test_the_compiler_of_a_machine_is_for_its_own_platform(tmp_path, monkeypatch
     monkeypatch.setattr(build.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(dap.SceneError, match="no libraries for windows-x86-64"):
         exported(tmp_path, platforms=["windows"])
-    assert exported(tmp_path).platforms == (own_platform(),)
+    assert exported(tmp_path).platforms == (build.own_platform(),)
 
 
 @pytest.mark.slow  # the first one makes the C libraries of the systems, some minutes

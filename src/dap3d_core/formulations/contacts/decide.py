@@ -24,6 +24,7 @@ from dap3d_core.formulations.contacts.contact_table import (
 from dap3d_core.formulations.contacts.forces import put_slip_against, size_across
 from dap3d_core.formulations.contacts.impacts import AT_REST, collide, repeat_rounds, unjam
 from dap3d_core.formulations.contacts.loads import find_modes
+from dap3d_core.formulations.contacts.modes import is_pressed
 from dap3d_core.formulations.contacts.rows import (
     add_scaled,
     change,
@@ -48,8 +49,8 @@ DEAD = 1e-12
 #: Part of the longest column below which slips that are stopped depend on each other.
 DEPENDENT = 1e-12
 #: What was decided, or why nothing is: joints prescribe that a contact closes, friction jams,
-#: bodies overlap at the start.
-DECIDED, PRESCRIBED, JAMMED, OVERLAPS = 0, 1, 2, 3
+#: bodies overlap at the start, friction would drive.
+DECIDED, PRESCRIBED, JAMMED, OVERLAPS, DRIVES = 0, 1, 2, 3, 4
 #: Places of a mode, the direction of sliding and the share among the states of elements.
 MODE, WAY, NEAR = 0, 1, 4
 
@@ -77,6 +78,8 @@ def decide(
         return OVERLAPS
     put_rows(t, s, system, loops)
     put_in_touch(s)
+    if find_drive(s):
+        return DRIVES
     take_ended(s)
     stop(s, system)
     if not leave_movable(t, s, system, loops, functions):
@@ -125,6 +128,9 @@ def repeat(t: float, s: ContactArrays, system: System, loops: Any, tensions: Any
     put_rows(t, s, system, loops)
     stop(s, system)
     repeat_rounds(s, system)
+    for c in range(s.mode.shape[0]):  # what sticks from here on slips no more, soon
+        s.was[c], s.stops[c] = s.mode[c], s.mode[c] == 2.0
+    stop(s, system)
     for c in range(s.mode.shape[0]):
         s.role[c], s.values[c] = s.mode[c] > 0.5, s.closing[c]
     lift(s)
@@ -156,6 +162,17 @@ def find_overlap(s: ContactArrays) -> bool:
     """True if the bodies of a contact overlap, which is ``culprit``."""
     for c in range(s.state.shape[0]):
         if s.says.found[c, REACH] >= 0.0 and s.says.found[c, GAP] < -s.limit[c]:
+            s.culprit = c
+            return True
+    return False
+
+
+@compiled
+def find_drive(s: ContactArrays) -> bool:
+    """True if friction of a contact in touch, ``culprit``, is negative or no number."""
+    for k in range(s.in_touch_count):
+        c = s.in_touch[k]
+        if not min(s.mu[c], s.mu_s[c]) >= 0.0 and is_pressed(s, c, s.in_touch, s.in_touch_count):
             s.culprit = c
             return True
     return False

@@ -18,7 +18,7 @@
 enum { RHS, PROJECT, REPORT, ACCEPTED, WATCH };
 /* Status of an integration (integration_state.py). */
 enum { RUNNING, FINISHED, STEP_FLOOR, NOT_FINITE, PROJECTION_FAILED, SWITCHED, CHATTERED, ENDED,
-       STIFF, JUMPED, STALLED, NO_ROOM };
+       STIFF, JUMPED, STALLED, NO_ROOM, DRIVEN };
 #define HORIZON 1e5
 #define ALIKE 1e-9
 #define LARGEST 1e100
@@ -428,7 +428,7 @@ static int let_jump(dap3d_model *m, const double *crossing, const double *sides,
 #endif
 
 #if CONTACTS
-enum { PRESCRIBED = 1, JAMMED, OVERLAPS, ENDLESS, SLOWLY };
+enum { PRESCRIBED = 1, JAMMED, OVERLAPS, PUSHES, ENDLESS, SLOWLY };
 
 /* Let switches of contacts be on the side of what goes on. */
 static void go_on(dap3d_model *m, double *sides)
@@ -501,7 +501,7 @@ static void say_failure(dap3d_model *m, double t)
     static const char *const words[] = {
         "", " closes, and joints or drivers prescribe the motion of its bodies",
         " jams: its friction presses the bodies together by more than it lets them give way",
-        ": its bodies overlap at the start", "s change ever faster",
+        ": its bodies overlap at the start", " would drive: its friction is negative", "s change ever faster",
         "s slip and turn by next to nothing, or rattle: slip jams again and again. Try smaller mu"};
     int has_name = m->failure < ENDLESS;
     const char *name = has_name ? contact_names[m->w[CONTACT_INTEGER + CI_culprit]] : "";
@@ -677,7 +677,7 @@ static int stopped(dap3d_model *m)
         "rates or a state are not finite", "no state on the constraints was found",
         "a switch of the model ended the run", "a switch changed its sign again and again", "",
         "the scene is stiff", "joints hold a velocity that is to jump", "steps are so short that the run would not end",
-        "more contacts came near than the model has room for"};
+        "more contacts came near than the model has room for", "friction of a contact is negative"};
     int64_t status = integer_of(m)[I_status];
     double t = status == FINISHED ? real_of(m)[R_t] : real_of(m)[R_t_stop];
     m->is_over = status == SWITCHED || status == FINISHED ? OVER : FAILED;
@@ -686,7 +686,7 @@ static int stopped(dap3d_model *m)
         return say_failure(m, t), DAP3D_ERROR;
 #endif
     snprintf(m->message, sizeof m->message, "the run stopped at t = %.9g s: %s", t,
-             words[status >= 0 && status <= NO_ROOM ? status : 0]);
+             words[status >= 0 && status <= DRIVEN ? status : 0]);
     return m->is_over == FAILED ? DAP3D_ERROR : DAP3D_ENDED;
 }
 

@@ -8,8 +8,20 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
-from dap3d_core.formulations.contacts.contact_table import GAP, REACH, SLIP, ContactTable
-from dap3d_core.formulations.contacts.decide import OVERLAPS, PRESCRIBED, decide, repeat
+from dap3d_core.formulations.contacts.contact_table import (
+    GAP,
+    REACH,
+    SLIP,
+    ContactTable,
+    words_of_drive,
+)
+from dap3d_core.formulations.contacts.decide import (
+    DRIVES,
+    OVERLAPS,
+    PRESCRIBED,
+    decide,
+    repeat,
+)
 from dap3d_core.formulations.contacts.impacts import ROUNDS
 from dap3d_core.formulations.contacts.modes import nearly_jams
 from dap3d_core.formulations.contacts.rows import follow_joints, keep_velocities, meet, put_rows
@@ -299,6 +311,9 @@ class ContactJumps(Jumps):
                 f"{start}{names[s.culprit]} closes, and joints or drivers prescribe the motion of "
                 "its bodies: nothing that it pushes with can stop them"
             )
+        if failure == DRIVES:
+            mu = min(s.mu[s.culprit], s.mu_s[s.culprit]) * s.arm[s.culprit]
+            raise SimulationError(f"{start}{words_of_drive(names[s.culprit], mu)}")
         jammed = " with ".join(names[c] for c in np.flatnonzero(s.jams))
         raise SimulationError(
             f"{start}{jammed} jams: its friction presses the bodies together by more than it lets "

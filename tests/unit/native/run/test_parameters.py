@@ -13,7 +13,7 @@ def compared(model, names, factors, folder, t_end=0.3, **settings):
     outputs = states_of(scene)
     made, library = exported(scene, folder, outputs=outputs, parameters=names, **settings)
     run, other = library.start(t_end), scene.copy()
-    from dap3d_core.study.parameters import parameters_named, with_values
+    from dap3d_core.study import parameters_named, with_values
 
     found = parameters_named(dap.compile(scene).checked, names)
     values = [p.value * factor for p, factor in zip(found, factors, strict=True)]
