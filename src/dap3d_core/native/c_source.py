@@ -350,7 +350,11 @@ def _contacts(law: ContactCode, place: Callable[[Any], int]) -> list[str]:
         *_defined(numbers),
         *_table("static const char *const contact_names[]", map(c_text, law.names)),
         *_law("int64_t", "contact_law", law.entry, law.arguments, place),
-        *(_law("void", "follow_drivers", law.follows, law.arguments[:3], place) if law.follows else []),
+        *(
+            _law("void", "follow_drivers", law.follows, law.arguments[:3], place)
+            if law.follows
+            else []
+        ),
     ]
 
 
