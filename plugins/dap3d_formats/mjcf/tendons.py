@@ -16,6 +16,7 @@ from dap3d_core.interface.formats import (
     held,
     length_of_line,
 )
+from dap3d_core.kernels.array_types import Floats
 from dap3d_formats.mjcf.reader import MjcfReader
 
 #: Joints with one coordinate.
@@ -89,6 +90,9 @@ def line_of(reader: MjcfReader, tendon: XmlElement, name: str) -> Tendon | None:
     for part in tendon:
         if part.name == "site":
             link, at = reader.site(part, "site")
+            if points and divisors[-1] and _same_place(points[-1], (link, at.r)):
+                drums = [drum for drum in drums if drum.after < len(points)]
+                continue  # between them the tendon pulls nothing, and passes no drum
             points.append((link, at.r))
             divisors.append(divisor)
         elif part.name == "pulley":
@@ -99,6 +103,10 @@ def line_of(reader: MjcfReader, tendon: XmlElement, name: str) -> Tendon | None:
     uniform = set(divisors[:-1]) <= {1.0}
     return Tendon(name, tuple(points), place=place, drums=tuple(drums),
                   divisors=() if uniform else tuple(divisors))  # fmt: skip
+
+
+def _same_place(first: tuple[str, Floats], second: tuple[str, Floats]) -> bool:
+    return first[0] == second[0] and np.array_equal(first[1], second[1])
 
 
 def _drum(reader: MjcfReader, part: XmlElement, after: int) -> Drum:

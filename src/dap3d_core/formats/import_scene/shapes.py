@@ -221,6 +221,9 @@ def _shapes(
         return []
     if shape.kind == "plane":
         return [("plane", {"at": at, "normal": float_tuple(z)})]
+    if shape.kind == "height_field":
+        field = {"heights": shape.heights, "size": shape.size}
+        return [("height_field", field | {"at": at, "p": quaternion(frame.A)})]
     if shape.kind == "ellipsoid":
         size = tuple(2.0 * half for half in shape.size)
         return [("ellipsoid", {"size": size, "at": at, "p": quaternion(frame.A)})]

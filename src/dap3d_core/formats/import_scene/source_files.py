@@ -3,9 +3,11 @@
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 
 import attrs
+import numpy as np
 
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Place, Remarks
 from dap3d_core.interface.formats.xml_tree import XmlElement, parse_xml
@@ -15,8 +17,8 @@ from dap3d_core.scene.files.read_mesh import read_mesh
 
 #: Larger files are not read, bytes.
 LARGEST = 64 * 2**20
-#: Meshes of more triangles are refused.
-MOST_TRIANGLES = 3_000_000
+#: Meshes of more triangles, and images of more pixels, are refused.
+MOST_TRIANGLES, MOST_PIXELS = 3_000_000, 1_000_000
 #: Number of included files beyond which a model is refused, and their depth.
 MOST_INCLUDES, DEEPEST_INCLUDE = 500, 30
 
@@ -137,6 +139,24 @@ class SourceFiles:
                 raise FormatError(f"{path.name} has more than {MOST_TRIANGLES} triangles", place)
             self._meshes[path] = mesh
         return self._meshes[path]
+
+    def image(self, path: Path, place: Place) -> Floats:
+        """The red of each pixel of a PNG file, 0 to 1, in rows from the lowest.
+
+        Raises:
+            FormatError: it is none, or is too large.
+        """
+        from PIL import Image
+
+        try:
+            with Image.open(BytesIO(self._read(path, place)), formats=("PNG",)) as image:
+                if image.width * image.height > MOST_PIXELS:
+                    raise FormatError(f"{path.name} has more than {MOST_PIXELS} pixels", place)
+                if image.mode.startswith("I"):
+                    return np.array(image)[::-1] // 256 / 255.0
+                return np.array(image.convert("RGB"))[::-1, :, 0] / 255.0
+        except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+            raise FormatError(f"{path.name} is no PNG image: {error}", place) from None
 
     def _inside(self, uri: str, place: Place, base: Path, *, missing: bool = False) -> Path:
         """A path within the folder or a package; with ``missing`` also one that is nowhere.

@@ -54,10 +54,12 @@ class Geometry:
     """A shape of a link, which is drawn.
 
     Attributes:
-        kind: box, sphere, cylinder, capsule, ellipsoid, mesh, or plane, whose normal is z.
+        kind: box, sphere, cylinder, capsule, ellipsoid, mesh, height_field, or plane, whose normal
+            is z.
         size: edges of a box; radius of a sphere; radius and length of a cylinder and (without its
             caps) a capsule, along z; semi-axes of an ellipsoid.
         pose: its frame in the link.
+        heights: rows along x of heights along y, m, of a height_field, whose size is its edges.
         mesh: path of the file of a mesh, as ``Source.locate`` returns it.
         scale: (3,) factors of a mesh.
         color: "#rrggbb", or "".
@@ -70,6 +72,7 @@ class Geometry:
     kind: str
     size: tuple[float, ...] = ()
     pose: Frame = IDENTITY
+    heights: tuple[tuple[float, ...], ...] = ()
     mesh: Any = None
     scale: tuple[float, ...] = (1.0, 1.0, 1.0)
     color: str = ""

@@ -66,6 +66,9 @@ class Source(Protocol):
     def mesh(self, path: Path, place: Place) -> tuple[Floats, Integers]:
         """Vertices (k, 3) and triangles (m, 3) of a mesh file."""
 
+    def image(self, path: Path, place: Place) -> Floats:
+        """The red of each pixel of a PNG file, 0 to 1, in rows from the lowest."""
+
 
 class Importer:
     """A format that models are read from.
