@@ -131,7 +131,8 @@ def units_of(prepared: PreparedRun, directions: Directions | None) -> list[Calle
     rare: list[Entry | PairEntry] = [*start.functions.entries] if start else []
     entries: list[Entry | PairEntry] = [e for e in image.functions.values() if e not in rare]
     for one in prepared.advances:
-        entries += [one.entry] if one.completes is None else [one.entry, one.completes]
+        entries.append(one.entry)
+        rare += [] if one.completes is None else [one.completes]
     law = prepared.jumps
     rare += [law.entry] if law else []
     rare += [law.follows] if isinstance(law, ContactCode) and law.follows else []
