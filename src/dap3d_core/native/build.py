@@ -2,20 +2,19 @@
 
 import importlib.util
 import platform
+import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import attrs
 
 from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.compiler.objects import OPTIMISED, Processor
-from dap3d_core.kernels.compiler.units import Unit
 from dap3d_core.kernels.runtime.cache import cache_folder
-from dap3d_core.native.c_source import symbols_of
-from dap3d_core.native.run.directions import PairUnit
+from dap3d_core.native.c_source import CalledUnit, symbols_of
 from dap3d_core.native.run.prepared import refusal
 
 #: Compiler options; nothing is contracted, for the bits of plain arithmetic.
@@ -129,17 +128,22 @@ def _run(command: list[str]) -> None:
         raise refusal(f"the compiler failed: {' | '.join(words[-6:])} [{' '.join(command[:6])}]")
 
 
-def object_of(unit: Unit | PairUnit, target: Platform, *, is_small: bool) -> bytes:
+def object_of(called: CalledUnit, target: Platform) -> bytes:
     """Object code of a unit for the linker of a platform, from the cache folder if it is there."""
-    folder, kind = cache_folder(), ".small" if is_small else ""
+    unit, folder = called.unit, cache_folder()
+    left_out = set(range(len(unit.symbols))) - called.kept
+    kind = "".join(f".{k}" for k in sorted(called.kept)) if left_out else ""
+    kind += "" if called.is_hot else ".small"
     path = None if folder is None else folder / f"{unit.name}.{target.name}{kind}.o"
     stored = None if path is None else objects.read_object(path)
     if stored is not None:
         return stored[1]
     symbols = symbols_of(unit)
     text, _ = unit.write(symbols)
-    if is_small:
+    if not called.is_hot:
         text = text.replace(" nounwind", SMALL)
+    for k in left_out:  # no code is made of what nothing calls
+        text = _linked(text, symbols[k], "internal")
     code = compiled(text, symbols, target)
     if path is not None:
         objects.write_object(path, [], code)
@@ -149,14 +153,18 @@ def object_of(unit: Unit | PairUnit, target: Platform, *, is_small: bool) -> byt
 def compiled(text: str, symbols: Sequence[str], target: Platform) -> bytes:
     """Object code of LLVM IR; its functions are seen within the library alone."""
     for symbol in symbols:
-        for head in ("define void", "define double"):
-            text = text.replace(f"{head} @{symbol}(", f"define hidden {head[7:]} @{symbol}(")
+        text = _linked(text, symbol, "hidden")
     objects.initialise_all_targets()
     return objects.compile_ir(text, OPTIMISED, target.processor, is_linked=True)
 
 
+def _linked(text: str, symbol: str, linkage: str) -> str:
+    """LLVM IR in which a function has a linkage."""
+    return re.sub(rf"define (\w+ @{symbol}\()", rf"define {linkage} \1", text)
+
+
 def build_objects(
-    units: Mapping[Unit | PairUnit, bool],
+    units: Sequence[CalledUnit],
     texts: Sequence[tuple[str, str]],
     target: Platform,
     folder: Path,
@@ -165,7 +173,7 @@ def build_objects(
 
     Units that steps do not call, such as the events of contacts, are made small.
     """
-    codes = [object_of(unit, target, is_small=not hot) for unit, hot in units.items()]
+    codes = [object_of(unit, target) for unit in units]
     codes += [compiled(text, [symbol], target) for text, symbol in texts]
     files = []
     for k, code in enumerate(codes):

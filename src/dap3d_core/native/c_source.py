@@ -110,20 +110,39 @@ def symbol_of(entry: Entry | PairEntry) -> str:
     return symbols_of(entry.unit)[entry.k]
 
 
-def units_of(prepared: PreparedRun, directions: Directions | None) -> dict[Unit | PairUnit, bool]:
-    """The units of compiled code that a run calls, and whether its steps do."""
+@attrs.frozen
+class CalledUnit:
+    """A unit of compiled code that a run calls.
+
+    Attributes:
+        unit: the unit.
+        kept: numbers of the functions of it that are called.
+        is_hot: steps call it.
+    """
+
+    unit: Unit | PairUnit
+    kept: set[int]
+    is_hot: bool
+
+
+def units_of(prepared: PreparedRun, directions: Directions | None) -> list[CalledUnit]:
+    """The units of compiled code that a run calls."""
     image, start = prepared.image, prepared.start
     rare: list[Entry | PairEntry] = [*start.functions.entries] if start else []
     entries: list[Entry | PairEntry] = [e for e in image.functions.values() if e not in rare]
     for one in prepared.advances:
-        entries += [one.entry] if one.completes is None else [one.entry, one.completes]
+        entries.append(one.entry)
+        rare += [] if one.completes is None else [one.completes]
     law = prepared.jumps
     rare += [law.entry] if law else []
     rare += [law.follows] if isinstance(law, ContactCode) and law.follows else []
     rare += directions.entries if directions else []
-    found = {entry.unit.name: (entry.unit, False) for entry in rare}
-    found |= {entry.unit.name: (entry.unit, True) for entry in entries}
-    return dict(found.values())
+    kept: dict[str, set[int]] = {}
+    for entry in [*rare, *entries]:
+        kept.setdefault(entry.unit.name, set()).add(entry.k)
+    hot = {entry.unit.name for entry in entries}
+    units = {entry.unit.name: entry.unit for entry in [*rare, *entries]}
+    return [CalledUnit(unit, kept[name], name in hot) for name, unit in units.items()]
 
 
 def data_of(
@@ -155,11 +174,7 @@ def data_of(
         (f"{{{s.t.hex()}, {int(s.jumps)}, {s.needs.hex()}}}" for s in prepared.stops)
         if prepared.stops else ["{0.0, 0, 0.0}"],
     )  # fmt: skip
-    lines += _table(
-        "static const struct { const char *name, *unit; int kind, first, count, is_mean; }\n"
-        "variables[]",
-        _rows_of(variables),
-    )
+    lines += _variables(variables)
     lines.append(f"void dap3d_outputs({', '.join(['const double *'] * 4)}, double *);")
     text = "\n".join(lines)
     digest = hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -207,15 +222,22 @@ def _defined(numbers: Mapping[str, Any]) -> list[str]:
     return [f"#define {name} {value}" for name, value in numbers.items()]
 
 
-def _rows_of(variables: Sequence[Variable]) -> list[str]:
-    rows, first = [], 0
+def _variables(variables: Sequence[Variable]) -> list[str]:
+    """The table of variables, with places of names in one text: addresses take more room."""
+    rows, first, size = [], 0, 0
+    starts: dict[str, int] = {}
     for v in variables:
         place = first if v.kind in PARAMETERS else v.first
         first += len(v.words)
-        name, unit = c_text(v.name), c_text(v.unit)
+        for text in (v.name, v.unit):
+            if text not in starts:
+                starts[text], size = size, size + len(text.encode()) + 1
+        texts = f"{starts[v.name]}, {starts[v.unit]}"
         numbers = f"{place}, {len(v.words)}, {int(v.is_mean)}"
-        rows.append(f"{{{name}, {unit}, DAP3D_{v.kind.upper()}, {numbers}}}")
-    return rows
+        rows.append(f"{{{texts}, DAP3D_{v.kind.upper()}, {numbers}}}")
+    texts_of = [f'    {c_text(text)} "\\0"' for text in starts]
+    head = "static const struct { int name, unit, kind, first, count, is_mean; } variables[]"
+    return ["static const char texts[] =", *texts_of, ";", *_table(head, rows)]
 
 
 def c_text(text: str) -> str:
@@ -329,7 +351,11 @@ def _contacts(law: ContactCode, place: Callable[[Any], int]) -> list[str]:
         *_defined(numbers),
         *_table("static const char *const contact_names[]", map(c_text, law.names)),
         *_law("int64_t", "contact_law", law.entry, law.arguments, place),
-        *(_law("void", "follow_drivers", law.follows, law.arguments[:3], place) if law.follows else []),
+        *(
+            _law("void", "follow_drivers", law.follows, law.arguments[:3], place)
+            if law.follows
+            else []
+        ),
     ]
 
 

@@ -2,6 +2,7 @@
 
 import ctypes
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -21,30 +22,27 @@ from dap3d_core.registry.arguments import checked
 from dap3d_core.simulation import SimulationError
 
 OK, ENDED = 0, 1
-_MODEL, _INT, _DOUBLE, _TEXT = ctypes.c_void_p, ctypes.c_int, ctypes.c_double, ctypes.c_char_p
-#: Functions of dap3d.h: result, arguments.
-_SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
-    "create": (_MODEL, [_DOUBLE]),
-    "free": (None, [_MODEL]),
-    "reset": (None, [_MODEL]),
-    "message": (_TEXT, [_MODEL]),
-    "count": (_INT, []),
-    "name": (_TEXT, [_INT]),
-    "unit": (_TEXT, [_INT]),
-    "kind": (_INT, [_INT]),
-    "set": (_INT, [_MODEL, _INT, _DOUBLE]),
-    "get": (_DOUBLE, [_MODEL, _INT]),
-    "get_all": (_INT, [_MODEL, _MODEL, _INT, _MODEL]),
-    "time": (_DOUBLE, [_MODEL]),
-    "step_to": (_INT, [_MODEL, _DOUBLE]),
-    "state_size": (ctypes.c_size_t, []),
-    "save": (_INT, [_MODEL, _MODEL]),
-    "load": (_INT, [_MODEL, _MODEL]),
-    "state_count": (_INT, []),
-    "directional": (_INT, [_MODEL, _MODEL, _INT, _MODEL, _INT, _MODEL, _MODEL]),
-    "derivatives": (_INT, [_MODEL, _DOUBLE, _MODEL, _MODEL]),
-    "set_states": (_INT, [_MODEL, _DOUBLE, _MODEL]),
-}
+#: Functions of dap3d.h: result, name, arguments; what they are of, where they are no pointers.
+DECLARED = re.compile(r"DAP3D_API ([\w *]+?)(dap3d_\w+)\((.*?)\);", re.DOTALL)
+TYPES: dict[str, Any] = {
+    "void": None, "int": ctypes.c_int, "double": ctypes.c_double, "size_t": ctypes.c_size_t,
+    "const char *": ctypes.c_char_p,
+}  # fmt: skip
+
+
+def _type_of(words: str) -> Any:
+    """The type of a result or an argument, with its name behind it or without."""
+    kind = re.sub(r"\w+$", "", words).strip() if " " in words else words
+    return TYPES.get(kind, ctypes.c_void_p)
+
+
+def _declare(library: Any) -> None:
+    """Give the functions of a library their types, those of the header."""
+    header = (Path(__file__).parent / "source" / "dap3d.h").read_text(encoding="utf-8")
+    for result, name, arguments in DECLARED.findall(header):
+        function, words = getattr(library, name), arguments.split(",")
+        function.restype = _type_of(result if "*" in result else result.strip())
+        function.argtypes = [] if words == ["void"] else [_type_of(word.strip()) for word in words]
 
 
 class NativeLibrary:
@@ -62,9 +60,7 @@ class NativeLibrary:
         folder = tempfile.mkdtemp()
         library = ctypes.CDLL(str(shutil.copy(path, folder)))
         shutil.rmtree(folder, ignore_errors=True)  # Windows keeps a file that is loaded
-        for name, (result, arguments) in _SIGNATURES.items():
-            function = getattr(library, f"dap3d_{name}")
-            function.restype, function.argtypes = result, arguments
+        _declare(library)
         self.functions: Any = library
         count = range(library.dap3d_count())
         names = [library.dap3d_name(v).decode() for v in count]

@@ -146,10 +146,12 @@ class Directions:
     def codes(self) -> dict[int, PairEntry]:
         """Word of the second memory -> function whose address stands there."""
         image = self._prepared.image
+        functions = {REPORT} if self.rates is None else {RHS, REPORT}
         return {
             PAIR * image.at(table) + k: PairEntry.of(entry)
             for table in self._tables
             for k, entry in enumerate(table.entries)
+            if table is not self._prepared.functions or k in functions
         }
 
     def tables(self) -> tuple[list[tuple[int, int, int]], list[tuple[int, int]]]:

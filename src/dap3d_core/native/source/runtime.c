@@ -156,9 +156,9 @@ const char *dap3d_message(const dap3d_model *m) { return m->message; }
 
 int dap3d_count(void) { return VARIABLES; }
 
-const char *dap3d_name(int v) { return v < 0 || v >= VARIABLES ? NULL : variables[v].name; }
+const char *dap3d_name(int v) { return v < 0 || v >= VARIABLES ? NULL : texts + variables[v].name; }
 
-const char *dap3d_unit(int v) { return v < 0 || v >= VARIABLES ? NULL : variables[v].unit; }
+const char *dap3d_unit(int v) { return v < 0 || v >= VARIABLES ? NULL : texts + variables[v].unit; }
 
 static int is_parameter(int v)
 {
@@ -171,7 +171,7 @@ int dap3d_kind(int v) { return v < 0 || v >= VARIABLES ? -1 : variables[v].kind;
 int dap3d_find(const char *name)
 {
     for (int v = 0; name != NULL && v < VARIABLES; v++)
-        if (strcmp(variables[v].name, name) == 0)
+        if (strcmp(texts + variables[v].name, name) == 0)
             return v;
     return -1;
 }

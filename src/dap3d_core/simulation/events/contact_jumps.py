@@ -234,7 +234,7 @@ class ContactJumps(Jumps):
         for first, numbers in states.items():
             s.y[first_state + first :][: len(numbers)] = numbers
         after, work = self._after(u), s.taken_work
-        self._take(integration, work)
+        self._take_decided(integration, work)
         self.settle(integration)
         return after, work
 
@@ -280,13 +280,13 @@ class ContactJumps(Jumps):
         given = t, s, evaluator.system, evaluator.loops
         if self.repeats:
             repeat(*given, table.tensions)
-            self._take(integration, float(np.sum(s.work)))
+            self._take_decided(integration, float(np.sum(s.work)))
             return
         if failure := decide(*given, evaluator.functions, table.tensions):
             self._refuse(t, failure)
         s.jammed = -1
         self.lose |= abs(float(np.sum(s.work))) > LOSSLESS * s.exchanged
-        self._take(integration, float(np.sum(s.work)))
+        self._take_decided(integration, float(np.sum(s.work)))
         after = self._after(u)
         for c in np.flatnonzero(np.abs(s.impulses[:, 0]) > 0.0).tolist():
             self._note(c, t, "impact", u, after, float(s.work[c]))
@@ -320,7 +320,7 @@ class ContactJumps(Jumps):
             "them give way, and no motion with Coulomb's law goes on from here"
         )
 
-    def _take(self, integration: Integration, work: float) -> None:
+    def _take_decided(self, integration: Integration, work: float) -> None:
         """Make the state ``y``, or the changes that led to it, that of an integration."""
         coordinates, s = self._evaluator.coordinates, self.arrays
         states = s.y[self._evaluator.model.integrated_layout["states"]].copy()
