@@ -117,8 +117,12 @@ def costs():
     free.add_force("weight", "g")
     rolling = ball(v=1.0, mu=0.3)
     rolling.bodies["ball"].w = [0.0, 10.0, 0.0]
+    resisting = rolling.copy()
+    resisting.contacts["floor"].fields.update(mu_roll=1e-3, mu_spin=1e-3)
     cases = {"no contact": (free, None), "open": (rolling, 0), "slides": (rolling, 1),
-             "sticks": (rolling, 2)}  # fmt: skip
+             "sticks": (rolling, 2), "rests and resists": (resisting, 2),
+             "rolls and spins against resistance": (resisting, [2, 1, 1]),
+             "slides and resists": (resisting, 1)}  # fmt: skip
     corners = {"open": 0, "slides on four corners": 1, "sticks on four": 2}
     cases = {f"a ball, {name}": case for name, case in cases.items()}
     cases |= {f"a box, {name}": (slope(0.9), mode) for name, mode in corners.items()}
@@ -151,7 +155,7 @@ def right_hand_sides(scene, mode):
         shares = table.count == 8
         closed = slice(None, None, 2 if shares else 1)
         states[table.mode[closed]] = mode
-        states[table.way[closed, 0]] = float(mode == 1)
+        states[table.way[closed, 0]] = np.equal(mode, 1)
         if shares and mode:
             states[table.near[closed]] = 0.25 * G * np.array([0.0, 0.0, 1.0])
     evaluator.states = states

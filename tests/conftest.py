@@ -86,6 +86,7 @@ def pytest_collection_modifyitems(items):
 def pytest_collection_finish():
     """Thousands of tests are no garbage: each collection would go through them again."""
     gc.freeze()
+    gc.set_threshold(10_000, *gc.get_threshold()[1:])
     gc.enable()
 
 

@@ -6,6 +6,7 @@ it off, by a part of a h^2. Events locate where it ends.
 
 import numpy as np
 import pytest
+from fuzz.contacts import LEGS, scene_on_legs
 from support.own_types import registry_of
 
 import dap3d_core as dap
@@ -117,6 +118,16 @@ def test_auto_steps_where_several_contacts_of_a_body_resist():
     assert any("by stepping" in note and "several contacts of one body" in note for note in notes)
     notes = dap.simulate(ball(True, mu_roll=0.01), t_end=0.01).notes
     assert not any("by stepping" in note for note in notes)
+
+
+def test_slip_of_legs_that_jams_is_stopped_where_one_of_them_resists_rolling():
+    """By an impulse without a collision, as without; energy is never gained."""
+    scene = scene_on_legs(LEGS + 2)
+    scene.contacts["c3"].fields["mu_roll"] = 0.001
+    result = by_events(scene, 0.05, dt=1e-3)
+    assert {event.name for event in result.events if event.kind == "impact"} >= {"c0", "c1", "c2"}
+    gain = np.max(np.diff(result.energy.total))
+    assert gain <= 1e-9 * np.max(result.energy.kinetic)
 
 
 def test_events_locate_where_a_ball_ends_to_spin_while_it_rolls_on():

@@ -4,6 +4,9 @@ from collections.abc import Sequence
 
 __all__ = ["main"]
 
+#: New objects until garbage is collected: what commands import and compile, some 100,000, is none.
+COLLECT_AFTER = 200_000
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code.
@@ -11,12 +14,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     Args:
         argv: the words after ``dap3d``; by default those of the process.
     """
+    import gc
     import sys
 
     try:  # Ctrl-C may come before anything is loaded
+        if argv is None:
+            gc.set_threshold(COLLECT_AFTER, *gc.get_threshold()[1:])
         from dap3d_core.cli.app import run_line
 
         return run_line(argv)
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 130
+    finally:
+        if argv is None:
+            gc.freeze()  # the process ends: its last collections would go through all there is

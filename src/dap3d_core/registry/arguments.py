@@ -96,11 +96,12 @@ def _with_settings(signature: inspect.Signature) -> inspect.Signature:
 def _refuse_unknown(
     function: Callable[..., Any], signature: inspect.Signature, given: Mapping[str, Any]
 ) -> None:
-    """Refuse an argument that there is none of, with the nearest, as Python words it."""
+    """Refuse an argument that there is none of, as Python words it: with the nearest, or all."""
     for name in given.keys() - signature.parameters.keys():
         near = nearest(name, signature.parameters)
         words = f"{function.__name__}() got an unexpected keyword argument {name!r}"
-        raise TypeError(f"{words}; did you mean {near!r}?" if near else words)
+        known = f"it takes {', '.join(signature.parameters)}"
+        raise TypeError(f"{words}; {f'did you mean {near!r}?' if near else known}")
 
 
 def require(name: str, kind: Any, value: Any) -> None:

@@ -1,7 +1,7 @@
 """Metadata of a run: origin, course, cost."""
 
 import json
-import platform
+import sys
 from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -48,7 +48,7 @@ def _installed() -> dict[str, str]:
             found[package] = version(package)
         except PackageNotFoundError:
             found[package] = "unknown"
-    return {**found, "python": platform.python_version()}
+    return {**found, "python": sys.version.partition(" ")[0]}
 
 
 def current_versions() -> dict[str, str]:

@@ -203,7 +203,7 @@ def test_a_program_for_windows_prints_under_wine_what_one_for_linux_does(tmp_pat
     wine = shutil.which("wine64") or shutil.which("wine")
     if wine is None:
         pytest.skip("there is no wine")
-    made = exported(tmp_path, platforms=[own_platform(), "windows"])
+    made = exported(tmp_path, platforms=[build.own_platform(), "windows"])
     tables = []
     for name in made.platforms:
         zig, program = build.PLATFORMS[name].zig, tmp_path / f"{name}.exe"

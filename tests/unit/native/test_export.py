@@ -447,6 +447,7 @@ def test_a_run_where_friction_would_drive_says_so(tmp_path, contact):
         dap.load_native(made.path).start(1.0).step_to(1.0)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("jams", "said"), [(-1, "rattle: slip jams again and again"),
                                             (99, "change ever faster")])  # fmt: skip
 def test_a_run_whose_contacts_come_to_no_end_says_why(tmp_path, monkeypatch, jams, said):

@@ -57,6 +57,7 @@ def test_on_axes_that_are_given(result):
         plot(result, "bob.r.x", "work", ax=given)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_files_of_each_kind(result, tmp_path, suffix):
     path = save_plot(result, ["bob.r", "energy.total", "J1.force.norm"], tmp_path / f"a{suffix}")

@@ -70,7 +70,8 @@ LEFT_ALONE = {
     # neither importers nor what they are made with; nothing of sweeps, fits, clusters
     PLAIN_RUN: ("dap3d_formats", "dap3d_core.formats", "dap3d_core.interface.formats", "xml",
                 "pyexpat", "dap3d_core.study", "dap3d_core.simulation.kinematics",
-                "scipy.integrate", "dap3d_core.simulation.redundancy.freedoms"),
+                "scipy.integrate", "dap3d_core.simulation.redundancy.freedoms",
+                "numpy.ma.", "uuid"),
     # a page of a scene without meshes: nothing for plots in files, or for meshes
     VIEWED: ("matplotlib", "trimesh", "netCDF4", "xarray", "rich", "click"),
 }  # fmt: skip

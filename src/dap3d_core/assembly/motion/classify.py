@@ -205,7 +205,7 @@ def classify_group(
 
 
 def _attempt(
-    group: Group, joints: ClosedJoints, rng: np.random.Generator
+    group: Group, joints: ClosedJoints, rng: "np.random.Generator"
 ) -> tuple[list[JointMotions], dict[int, str]]:
     """The motions found on one way, and reasons for joints that have none."""
     varies = joints.residual(joints.start, _random_poses(rng, joints)) > OPEN
@@ -228,7 +228,7 @@ def _attempt(
 
 
 def _one_factor(
-    group: Group, joints: ClosedJoints, members: Integers, rng: np.random.Generator
+    group: Group, joints: ClosedJoints, members: Integers, rng: "np.random.Generator"
 ) -> Iterator[JointMotions]:
     """Motions of constant N, to be tried; their joints are places in the group."""
     slots, length = two_slots(group), joints.rows.length
@@ -239,7 +239,7 @@ def _one_factor(
 
 
 def _two_factors(
-    group: Group, joints: ClosedJoints, members: Integers, rng: np.random.Generator
+    group: Group, joints: ClosedJoints, members: Integers, rng: "np.random.Generator"
 ) -> Iterator[JointMotions]:
     """Motions whose twists are constant in body j or in body i, to be tried."""
     d = joints.free.shape[-1]
@@ -310,7 +310,7 @@ def _motions(
     return JointMotions(group.keyword, two_slots(group), parts, members, i, j, start, screws)
 
 
-def _fits(motion: JointMotions, joints: ClosedJoints, rng: np.random.Generator) -> Any:
+def _fits(motion: JointMotions, joints: ClosedJoints, rng: "np.random.Generator") -> Any:
     """(m,) True where C = 0 at random coordinates, and no part is a combination of others."""
     units = motion.units(joints.rows.length)
     fits = np.ones(len(motion.joints), dtype=bool)
@@ -325,7 +325,7 @@ def _fits(motion: JointMotions, joints: ClosedJoints, rng: np.random.Generator) 
     return fits
 
 
-def _random_poses(rng: np.random.Generator, joints: ClosedJoints) -> Pose:
+def _random_poses(rng: "np.random.Generator", joints: ClosedJoints) -> Pose:
     """A random pose for every body j, within a length of the scene of the origin."""
     r, p = rng.normal(size=(joints.count, 3)), rng.normal(size=(joints.count, 4))
     return Pose(r * joints.rows.length, p / np.linalg.norm(p, axis=-1, keepdims=True))

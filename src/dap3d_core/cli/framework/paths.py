@@ -3,7 +3,6 @@
 import math
 import os
 import sys
-import uuid
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -84,7 +83,7 @@ def writable(
 
 def write_text(path: Path, text: str) -> None:
     """Replace a file as a whole; a link is replaced, never followed."""
-    temporary = path.with_name(f".{uuid.uuid4().hex}.part")
+    temporary = path.with_name(f".{os.urandom(16).hex()}.part")
     try:
         try:
             with temporary.open("x", encoding="utf-8", newline="\n") as file:

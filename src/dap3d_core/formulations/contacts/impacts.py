@@ -83,9 +83,10 @@ def stop_slip(s: ContactArrays) -> bool:
     begin_problem(s)
     cone, n, pushes = s.cone, 3 * s.closed_count, False
     for i in range(n):
-        s.x[i] = -cone.b[i]
+        resists = cone.under[i // 3] != i // 3  # it begins with forces: moments are bounded by them
+        s.x[i] = 0.0 if resists else -cone.b[i]
         for k in range(n):
-            s.B[i, k] = cone.A[i, k]
+            s.B[i, k] = 0.0 if resists or cone.under[k // 3] != k // 3 else cone.A[i, k]
     rank = factor_least(s.B, n, n, DEPENDENT, 0.0, s.w, s.order)
     solve_least(s.B, n, n, rank, s.w, s.order, s.x, cone.x)
     left = solve_cone(cone, TRIES)

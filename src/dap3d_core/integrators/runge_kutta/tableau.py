@@ -68,7 +68,7 @@ class Tableau:
     @property
     def widest_gap_abscissa(self) -> float:
         """The middle of the widest gap between the abscissae of the stages: nothing is sampled."""
-        c = np.unique(self.c[: self.stages])
+        c = np.sort(self.c[: self.stages])
         widest = int(np.argmax(np.diff(c)))
         return float(0.5 * (c[widest] + c[widest + 1]))
 

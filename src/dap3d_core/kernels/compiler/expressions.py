@@ -5,7 +5,7 @@ import builtins
 import inspect
 import types
 from collections.abc import Callable, Hashable, Sequence
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 from dap3d_core.kernels.compiler import types as t
@@ -330,7 +330,7 @@ class Expressions(Writer):
         return self._call_function(node, function, arguments)
 
     def _call_function(self, node: ast.Call, function: Any, arguments: list[t.Value]) -> t.Value:
-        name, signature = inspect.unwrap(function).__qualname__, inspect.signature(function)
+        name, signature = inspect.unwrap(function).__qualname__, _signature(function)
         try:
             given = signature.bind(*arguments)
         except TypeError as error:
@@ -375,6 +375,10 @@ class Expressions(Writer):
             return t.Value(result, (whole,))
         parts = (self.new(f"extractvalue {type_} {whole}, {k}") for k in range(count))
         return t.Value(result, tuple(parts))
+
+
+#: Parameters of functions, most of which are called more than once; scenes make some of their own.
+_signature = lru_cache(maxsize=4096)(inspect.signature)
 
 
 def _parts(node: ast.expr) -> list[ast.expr]:

@@ -289,12 +289,17 @@ def _named(target: ast.expr, value: t.Value) -> dict[str, t.Value]:
     return {name: x for part, item in parts for name, x in _named(part, item).items()}
 
 
-def _stores(node: ast.AST) -> list[ast.Name]:
-    names = (n for n in ast.walk(node) if isinstance(n, ast.Name))
-    return [n for n in names if isinstance(n.ctx, ast.Store)]
-
-
 @cache
+def _stores(node: ast.AST) -> list[ast.Name]:
+    """Where a function, or a part of it, assigns to names; no expression of the subset does."""
+    if isinstance(node, ast.expr):  # a target
+        names = (n for n in ast.walk(node) if isinstance(n, ast.Name))
+        return [n for n in names if isinstance(n.ctx, ast.Store)]
+    targets = [*getattr(node, "targets", ()), *filter(None, [getattr(node, "target", None)])]
+    blocks = *getattr(node, "body", ()), *getattr(node, "orelse", ())
+    return [name for part in (*targets, *blocks) for name in _stores(part)]
+
+
 def stored_names(node: ast.AST) -> set[str]:
     """Names that a function, or a part of it, assigns to."""
     return {n.id for n in _stores(node)}

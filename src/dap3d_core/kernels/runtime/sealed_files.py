@@ -6,7 +6,6 @@ crash it, or compute other numbers.
 
 import hashlib
 import os
-import uuid
 import warnings
 from contextlib import suppress
 from pathlib import Path
@@ -48,7 +47,7 @@ def sealed_content(path: str | os.PathLike[str]) -> bytes | None:
 
 def write_file(path: Path, data: bytes) -> bool:
     """Write a complete file, or none: under another name, then renamed, as processes may race."""
-    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
+    temporary = path.with_name(f".{path.name}.{os.urandom(16).hex()}")
     try:
         temporary.write_bytes(data)
         os.replace(temporary, path)

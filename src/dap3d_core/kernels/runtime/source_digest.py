@@ -43,11 +43,17 @@ def digest(*parts: str | bytes) -> str:
 @cache
 def driver_digest(layer: str) -> str:
     """Digest of all sources that decide what the compiled code of a layer of the core computes."""
-    root = Path(__file__).parents[2]
-    below = COMPILED_LAYERS[: COMPILED_LAYERS.index(layer) + 1]
-    files = sorted(f for name in below for f in (root / name).rglob("*.py"))
-    parts = ((f.relative_to(root).as_posix(), f.read_bytes()) for f in files)
-    return source_digest(*(part for both in parts for part in both))
+    k = COMPILED_LAYERS.index(layer)
+    below = driver_digest(COMPILED_LAYERS[k - 1]) if k else ""
+    root = os.path.join(Path(__file__).parents[2], layer)
+    files = sorted(
+        os.path.join(folder, name)
+        for folder, _, names in os.walk(root)
+        for name in names
+        if name.endswith(".py")
+    )
+    parts = ((f.removeprefix(root).replace(os.sep, "/"), Path(f).read_bytes()) for f in files)
+    return source_digest(below, *(part for both in parts for part in both))
 
 
 def origin(functions: list[Any]) -> list[str | bytes]:

@@ -2,7 +2,6 @@
 
 import errno
 import os
-import secrets
 import shutil
 import stat
 from collections.abc import Callable, Iterable, Iterator
@@ -137,7 +136,7 @@ def reserve(target: Path) -> Path:
     def create(file: Path) -> None:
         os.close(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
 
-    return _claim(target, (f".new-{secrets.token_hex(6)}" for _ in range(_MOST_PARTS)), create)
+    return _claim(target, (f".new-{os.urandom(6).hex()}" for _ in range(_MOST_PARTS)), create)
 
 
 def named_part(file: Path, target: Path) -> Path:

@@ -2,7 +2,6 @@
 
 import os
 import re
-import uuid
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -57,7 +56,7 @@ def save(scene: SceneTables, path: str | Path, force: bool) -> Path:
         if not force and os.path.exists(path):
             raise file_error(path, "exists; force=True overwrites it")
         target = Path(os.path.realpath(path))  # a link stays one
-        temporary = target.with_name(f".{uuid.uuid4().hex}.toml")
+        temporary = target.with_name(f".{os.urandom(16).hex()}.toml")
         try:
             with temporary.open("xb") as file:
                 file.write(text.encode("utf-8"))

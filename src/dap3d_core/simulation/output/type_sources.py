@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 #: Its sources are known by the version of dap3d.
 CORE = "dap3d_core"
+#: Fields of statements that hold others.
+BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")
 
 
 def digests_of(checked: "ValidatedScene") -> dict[str, str]:
@@ -86,7 +88,7 @@ def digest_of(type_: Any) -> str:
         if module.__name__.partition(".")[0] != root or root == CORE:
             continue
         try:
-            modules[module.__name__] = _code_of(Path(module.__file__ or ""))
+            modules[module.__name__] = _code_of(Path(module.__file__ or "").read_bytes())
         except OSError:
             return ""
         for value in list(vars(module).values()):
@@ -101,28 +103,29 @@ def digest_of(type_: Any) -> str:
     return together.hexdigest()[:20]
 
 
-def _code_of(path: Path) -> bytes:
+@lru_cache(maxsize=1000)  # types of a package share files
+def _code_of(content: bytes) -> bytes:
     """The content of a source file without what changes no formula; of another file, all of it."""
-    content = path.read_bytes()
     try:
         tree = ast.parse(content)
     except (SyntaxError, ValueError):
         return content
-    return ast.unparse(_Formulas().visit(tree)).encode()
+    _keep_formulas(tree)
+    return ast.unparse(tree).encode()
 
 
-class _Formulas(ast.NodeTransformer):
-    """Removes statements that are a text alone, and what a class says of its picture."""
+def _keep_formulas(node: ast.AST) -> None:
+    """Remove statements that are a text alone, and what a class says of its picture."""
+    for field in BLOCKS:
+        inner = getattr(node, field, None)
+        if isinstance(inner, list):  # of a lambda or a conditional expression it is none
+            inner[:] = [one for one in inner if not _is_text(one, isinstance(node, ast.ClassDef))]
+            for one in inner:
+                _keep_formulas(one)
 
-    def visit_Expr(self, node: ast.Expr) -> ast.Expr | None:
-        """The statement, or None where it does nothing."""
-        return None if isinstance(node.value, ast.Constant) else node
 
-    def visit_ClassDef(self, node: ast.ClassDef) -> ast.AST:
-        """The class without its ``symbol``, from which nothing is computed."""
-        node.body = [
-            one
-            for one in node.body
-            if not (isinstance(one, ast.Assign) and ast.unparse(one.targets[0]) == "symbol")
-        ]
-        return self.generic_visit(node)
+def _is_text(node: ast.AST, in_class: bool) -> bool:
+    """True of a text alone, and of the ``symbol`` of a class, from which nothing is computed."""
+    if isinstance(node, ast.Expr):
+        return isinstance(node.value, ast.Constant)
+    return in_class and isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "symbol"

@@ -89,7 +89,7 @@ def redundancy_elsewhere(evaluator: Evaluator, u: Floats, redundancy: Redundancy
     return GenericRank(tuple(ranks), redundant, redundant == redundancy.rank.redundant)
 
 
-def _other_pose(evaluator: Evaluator, u: Floats, rng: np.random.Generator) -> Floats | None:
+def _other_pose(evaluator: Evaluator, u: Floats, rng: "np.random.Generator") -> Floats | None:
     """A state at another pose, or None where the joints allow none."""
     n, size = evaluator.model.body_count, evaluator.model.size
     rows = finite_rows(evaluator, 0.0, u)

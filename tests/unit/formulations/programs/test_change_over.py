@@ -89,6 +89,7 @@ def sliding_rod():
     return scene
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("method", ["lsq", "joint"])
 def test_contacts_run_by_programs_of_their_modes(method, at_once):
     """One for each set of modes; where switches have just been read rates are known.

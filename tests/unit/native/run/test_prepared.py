@@ -126,13 +126,13 @@ def door():
     return scene
 
 
-@pytest.mark.every(5)
+@pytest.mark.every(8)
 @pytest.mark.parametrize(
     ("make", "settings"),
     [
+        (sled, {}),
         *((thrown, {"integrator": name}) for name in ("dop853", "adams", "radau", "auto")),
         (thrown, {"integrator": "rk4", "step": 1e-3}),
-        (sled, {}),
         *((door, {"method": method}) for method in ("lsq", "auto")),
     ],
 )

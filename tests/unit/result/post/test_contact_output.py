@@ -128,7 +128,7 @@ def test_info_names_shapes_that_meet(tmp_path, capfd, monkeypatch):
     assert main(["info", file]) == 0
     text = capfd.readouterr().out
     assert "shapes       marble, ground_plane" in text
-    assert "met          at 2 points at reported instants" in text
+    assert "met          at 3 points at reported instants" in text
     assert "{" not in text
     assert max(map(len, text.splitlines())) <= 60
 

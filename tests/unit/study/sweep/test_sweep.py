@@ -314,7 +314,11 @@ def part(tmp_path, one_by_one):
         ({"outputs": ["block.r.y"]}, {}, "other outputs"),
         ({"seed": 1}, {}, "another seed"),
         ({"vary": {"forces.spring.k": "4:8"}}, {}, "other numbers that vary, or other values"),
-        ({}, {"current_versions": current_versions() | {"numpy": "1.0"}}, "other versions of dap3d"),
+        (
+            {},
+            {"current_versions": current_versions() | {"numpy": "1.0"}},
+            "other versions of dap3d",
+        ),
         ({}, {"digests_of": {"force ptp": "x"}}, "the file of a type has changed since"),
     ],
 )
