@@ -17,7 +17,8 @@ contacts with Coulomb's law, solved with MuJoCo's own matrices; and the contacts
 
 With --count each file is imported with contacts and no option but a root, its folder: a row says
 whether it was, or why not; the sums are of the files that MuJoCo reads (SDF: of all) and in which
-something moves. A file takes --seconds of CPU time at most. Public files come in wheels that need no installation:
+something moves. A file takes --seconds of CPU time at most. Public files come in wheels that need
+no installation:
 
     pip download --no-deps -d wheels dm_control example_robot_data gymnasium gymnasium_robotics \\
         metaworld myosuite playground pybullet robosuite robosuite_models safety_gymnasium brax \\

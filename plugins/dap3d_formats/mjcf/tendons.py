@@ -1,5 +1,7 @@
 """Tendons of MJCF: lines over sites, spheres and cylinders, with pulleys; sums of coordinates."""
 
+from typing import Any
+
 import attrs
 import numpy as np
 
@@ -16,7 +18,6 @@ from dap3d_core.interface.formats import (
     held,
     length_of_line,
 )
-from dap3d_core.kernels.array_types import Floats
 from dap3d_formats.mjcf.reader import MjcfReader
 
 #: Joints with one coordinate.
@@ -86,7 +87,10 @@ def line_of(reader: MjcfReader, tendon: XmlElement, name: str) -> Tendon | None:
             reader.document.source.remarks.leave_out(place, text, motion=True)
             return None
         return Tendon(name, terms=terms, place=place)
-    points, drums, divisors, divisor = [], [], [], 1.0
+    points: list[tuple[str, Any]] = []
+    drums: list[Drum] = []
+    divisors: list[float] = []
+    divisor = 1.0
     for part in tendon:
         if part.name == "site":
             link, at = reader.site(part, "site")
@@ -105,8 +109,9 @@ def line_of(reader: MjcfReader, tendon: XmlElement, name: str) -> Tendon | None:
                   divisors=() if uniform else tuple(divisors))  # fmt: skip
 
 
-def _same_place(first: tuple[str, Floats], second: tuple[str, Floats]) -> bool:
-    return first[0] == second[0] and np.array_equal(first[1], second[1])
+def _same_place(first: tuple[str, Any], second: tuple[str, Any]) -> bool:
+    """True for two places of a link, each its name and (3,) m, that are one."""
+    return first[0] == second[0] and bool(np.array_equal(first[1], second[1]))
 
 
 def _drum(reader: MjcfReader, part: XmlElement, after: int) -> Drum:

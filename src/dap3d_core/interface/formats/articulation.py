@@ -59,7 +59,6 @@ class Geometry:
         size: edges of a box; radius of a sphere; radius and length of a cylinder and (without its
             caps) a capsule, along z; semi-axes of an ellipsoid.
         pose: its frame in the link.
-        heights: rows along x of heights along y, m, of a height_field, whose size is its edges.
         mesh: path of the file of a mesh, as ``Source.locate`` returns it.
         scale: (3,) factors of a mesh.
         color: "#rrggbb", or "".
@@ -67,12 +66,12 @@ class Geometry:
         contact: how it meets others, where contacts are imported; None if it does not.
         place: its place in the file.
         name: its name in the file, or "".
+        heights: rows along x of heights along y, m, of a height_field, whose size is its edges.
     """
 
     kind: str
     size: tuple[float, ...] = ()
     pose: Frame = IDENTITY
-    heights: tuple[tuple[float, ...], ...] = ()
     mesh: Any = None
     scale: tuple[float, ...] = (1.0, 1.0, 1.0)
     color: str = ""
@@ -80,6 +79,7 @@ class Geometry:
     contact: "Contact | None" = None
     place: Place = NOWHERE
     name: str = ""
+    heights: tuple[tuple[float, ...], ...] = ()
 
 
 #: Coefficients of friction, and the ``directions`` of a contact from which on they count.
