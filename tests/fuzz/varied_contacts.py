@@ -177,7 +177,7 @@ class Varied:
                 self.scene.add_point(f"eye{k}", "ground", r)
             self.scene.add_force(
                 "ptp", f"spring{k}", P_i=f"{one}.O", P_j=f"eye{k}" if other == "ground" else f"{other}.O",
-                k=self.one_of(5.0, 50.0, 500.0), c=self.one_of(0.0, 0.0, 1.0), l0=self.one_of(0.0, 0.3),
+                k=self.one_of(5.0, 50.0, 200.0), c=self.one_of(0.0, 0.0, 1.0), l0=self.one_of(0.0, 0.3),
             )  # fmt: skip
 
 
