@@ -21,7 +21,6 @@ from support.studies import POINTS, bob, collected, same
 import dap3d_core as dap
 from dap3d_core.study import Ensemble, PointStatus
 from dap3d_core.study.workers import dask_cluster
-from dap3d_core.study.workers.dask_cluster import ClusterError, connect, run_on
 from dap3d_core.study.workers.environment import differences, environment_of, with_absolute_path
 from dap3d_core.study.workers.threads import run_here
 
@@ -45,8 +44,8 @@ def two_workers():
     with (
         distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
-        ) as dask_cluster,
-        distributed.Client(dask_cluster) as client,
+        ) as local,
+        distributed.Client(local) as client,
     ):
         yield client
 
@@ -100,15 +99,15 @@ def wait_until(condition, seconds=30.0):
 def test_numbers_are_those_of_one_process(client, alone):
     """Bit for bit, with sizes of tasks by the clock and given ones; in the end both workers have
     taken part, each of which has compiled the study once for all its tasks."""
-    same(alone, collected(run_on(client, bob(), POINTS, PLACES)))
-    same(alone, collected(run_on(client, bob(), POINTS, PLACES, chunk=7)))
+    same(alone, collected(dask_cluster.run_on(client, bob(), POINTS, PLACES)))
+    same(alone, collected(dask_cluster.run_on(client, bob(), POINTS, PLACES, chunk=7)))
     some = np.array([40, 3, 11])
-    found = collected(run_on(client, bob(), POINTS, some))
+    found = collected(dask_cluster.run_on(client, bob(), POINTS, some))
     same({k: alone[k] for k in sorted(found)}, dict(sorted(found.items())))
-    assert list(run_on(client, bob(), POINTS, PLACES[:0])) == []
+    assert list(dask_cluster.run_on(client, bob(), POINTS, PLACES[:0])) == []
 
     def kept():
-        collected(run_on(client, bob(), POINTS, PLACES, chunk=1))
+        collected(dask_cluster.run_on(client, bob(), POINTS, PLACES, chunk=1))
         found = client.run(
             lambda: len(sys.modules["dap3d_core.study.workers.dask_cluster"]._ensembles)
         )
@@ -119,9 +118,9 @@ def test_numbers_are_those_of_one_process(client, alone):
 
 def test_nothing_is_left_on_the_cluster(client):
     """After the end, and where nobody asks for the rest."""
-    collected(run_on(client, bob(), POINTS, PLACES))
+    collected(dask_cluster.run_on(client, bob(), POINTS, PLACES))
     wait_until(lambda: not client.who_has())
-    found = run_on(client, bob(), POINTS, np.arange(200), chunk=1)
+    found = dask_cluster.run_on(client, bob(), POINTS, np.arange(200), chunk=1)
     next(found)
     found.close()
     wait_until(lambda: not any(client.processing().values()))
@@ -129,7 +128,7 @@ def test_nothing_is_left_on_the_cluster(client):
 
 
 def test_ctrl_c_cancels_the_tasks(client):
-    found = run_on(client, bob(), POINTS, np.arange(200), chunk=1)
+    found = dask_cluster.run_on(client, bob(), POINTS, np.arange(200), chunk=1)
     next(found)
     with pytest.raises(KeyboardInterrupt):
         found.throw(KeyboardInterrupt)
@@ -142,13 +141,13 @@ def test_functions_of_the_script_are_sent(client, tmp_path, monkeypatch):
     study = bob(asked)
     same(
         collected(run_here(Ensemble(study), POINTS, PLACES[:8], threads=1)),
-        collected(run_on(client, study, POINTS, PLACES[:8])),
+        collected(dask_cluster.run_on(client, study, POINTS, PLACES[:8])),
     )
     (tmp_path / "mine.py").write_text("def lowest(result):\n    return result.r[:, 0, 2].min()\n")
     monkeypatch.syspath_prepend(str(tmp_path))
     elsewhere = bob({"lowest": importlib.import_module("mine").lowest})
-    with pytest.raises(ClusterError, match="2 of 2 workers") as error:
-        run_on(client, elsewhere, POINTS, PLACES)
+    with pytest.raises(dask_cluster.ClusterError, match="2 of 2 workers") as error:
+        dask_cluster.run_on(client, elsewhere, POINTS, PLACES)
     assert "functions among the outputs must be defined in the script" in str(error.value)
 
 
@@ -157,7 +156,7 @@ def test_a_point_that_fails_is_no_task_that_fails(client):
     points = POINTS[:6].copy()
     points[2, 0] = -1.0  # kg
     study, places = bob(), np.arange(6)
-    found = collected(run_on(client, study, points, places, chunk=3))
+    found = collected(dask_cluster.run_on(client, study, points, places, chunk=3))
     same(collected(run_here(Ensemble(study), points, places, threads=1)), found)
     status = [found[k][0] for k in places]
     assert status == [PointStatus.DONE] * 2 + [PointStatus.FAILED] + [PointStatus.DONE] * 3
@@ -196,7 +195,9 @@ def test_a_task_that_raises_is_tried_again(tmp_path, monkeypatch, alone):
             marks = tmp_path / str(retries)
             marks.mkdir()
             study = bob({"lowest": stumbling(str(marks))})
-            found = run_on(client, study, POINTS, PLACES[:20], chunk=10, retries=retries)
+            found = dask_cluster.run_on(
+                client, study, POINTS, PLACES[:20], chunk=10, retries=retries
+            )
             if not retries:
                 with pytest.raises(ConnectionError, match="for once"):
                     collected(found)
@@ -209,7 +210,7 @@ def test_a_task_that_raises_is_tried_again(tmp_path, monkeypatch, alone):
 def test_a_worker_that_is_killed_loses_nothing(alone):
     """By SIGKILL, in the middle; what it had is done by the others, and nothing comes twice."""
     with two_workers() as client:
-        found, parts = run_on(client, bob(), POINTS, PLACES, chunk=2), []
+        found, parts = dask_cluster.run_on(client, bob(), POINTS, PLACES, chunk=2), []
         parts += [next(found) for _ in range(3)]
         victim = next(iter(client.run(os.getpid).values()))
         os.kill(victim, signal.SIGKILL)
@@ -223,7 +224,7 @@ def test_a_worker_that_is_lost_while_it_reports_its_versions_has_no_say(client, 
         (pid,) = client.run(os.getpid, workers=[address]).values()
         os.kill(pid, signal.SIGSTOP)
         threading.Timer(1.0, os.kill, (pid, signal.SIGKILL)).start()
-        same(alone, collected(run_on(client, bob(), POINTS, PLACES)))
+        same(alone, collected(dask_cluster.run_on(client, bob(), POINTS, PLACES)))
 
 
 class _Losing:
@@ -256,7 +257,7 @@ def test_where_all_workers_are_lost_others_are_waited_for():
     losing = _Losing(gone, lost, {"b": OSError("reset"), "c": "fit"})
     assert dask_cluster._answers(losing, b"") == {"c": "fit"}
     assert losing.asked == 3
-    with pytest.raises(ClusterError, match="has no workers"):
+    with pytest.raises(dask_cluster.ClusterError, match="has no workers"):
         dask_cluster._answers(_Losing(gone, lost), b"")
 
 
@@ -271,9 +272,9 @@ def test_points_that_kill_their_workers_are_named():
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 0}),
         two_workers() as client,
-        pytest.raises(ClusterError, match=words),
+        pytest.raises(dask_cluster.ClusterError, match=words),
     ):
-        collected(run_on(client, bob({"none": deadly}), POINTS, np.array([4])))
+        collected(dask_cluster.run_on(client, bob({"none": deadly}), POINTS, np.array([4])))
 
 
 PUSH = """
@@ -331,8 +332,8 @@ def installed(tmp_path, monkeypatch):
 
 def test_workers_without_a_plugin_are_named(client, installed, tmp_path):
     """At once, all of them, with what is missing and what to do."""
-    with pytest.raises(ClusterError) as error:
-        run_on(client, pushed(), POINTS, PLACES)
+    with pytest.raises(dask_cluster.ClusterError) as error:
+        dask_cluster.run_on(client, pushed(), POINTS, PLACES)
     title, *lines = str(error.value).splitlines()
     assert title == "2 of 2 workers cannot run this study:"
     wanted = "it lacks the force type 'push' of dap3d-push 1.2; pip install dap3d-push==1.2 there"
@@ -351,8 +352,8 @@ def test_versions_of_plugins_are_compared(client, installed, tmp_path, version, 
     """One worker has the plugin: the same, another version, the same version of another text."""
     there = package(tmp_path / "there", version, k=k)
     with another_worker(client, PYTHONPATH=path(there)) as address:
-        with pytest.raises(ClusterError) as error:
-            run_on(client, pushed(), POINTS, PLACES)
+        with pytest.raises(dask_cluster.ClusterError) as error:
+            dask_cluster.run_on(client, pushed(), POINTS, PLACES)
         lines = [line for line in str(error.value).splitlines() if line.startswith(address)]
         assert [line.partition(": ")[2][: len(words)] for line in lines] == [words] * bool(words)
 
@@ -372,9 +373,9 @@ def test_versions_of_dap3d_are_compared(client, tmp_path, file, text, words):
     (tmp_path / file).write_text(text)
     with (
         another_worker(client, PYTHONPATH=path(tmp_path)) as address,
-        pytest.raises(ClusterError) as error,
+        pytest.raises(dask_cluster.ClusterError) as error,
     ):
-        run_on(client, bob(), POINTS, PLACES)
+        dask_cluster.run_on(client, bob(), POINTS, PLACES)
     title, line = str(error.value).splitlines()
     assert title == "1 of 3 workers cannot run this study:"
     version = dap.simulate("fourbar3", t_end=0.0).record.versions["dap3d"]
@@ -386,11 +387,11 @@ def test_a_worker_that_comes_late_is_asked_as_well(installed, tmp_path):
     late = package(tmp_path / "late", "1.2", k=2.0)
     with two_workers() as client:  # which look for modules where this process does
         first = list(client.nthreads())
-        found = run_on(client, pushed(), POINTS, np.arange(200), chunk=1, retries=0)
+        found = dask_cluster.run_on(client, pushed(), POINTS, np.arange(200), chunk=1, retries=0)
         next(found)
         with another_worker(client, PYTHONPATH=path(late)) as address:
             client.retire_workers(first)
-            with pytest.raises(ClusterError) as error:
+            with pytest.raises(dask_cluster.ClusterError) as error:
                 collected(found)
     assert str(error.value).startswith(f"{address} cannot run this study: the file of its force")
 
@@ -406,7 +407,7 @@ def test_types_of_the_model_itself_need_its_folder(client, tmp_path, monkeypatch
     assert not study.scene.path.is_absolute()
     same(
         collected(run_here(Ensemble(study), POINTS, PLACES[:8], threads=1)),
-        collected(run_on(client, study, POINTS, PLACES[:8], chunk=2)),
+        collected(dask_cluster.run_on(client, study, POINTS, PLACES[:8], chunk=2)),
     )
     here = environment_of(with_absolute_path(study))
     (folder / "plugin.py").rename(folder / "gone.py")
@@ -420,12 +421,14 @@ def test_types_of_the_model_itself_need_its_folder(client, tmp_path, monkeypatch
 def test_who_does_not_answer_is_named():
     """Within the time given, in one sentence."""
     begun = time.monotonic()
-    with pytest.raises(ClusterError, match=r"no dask scheduler answers at tcp://127.0.0.1:9 "):
-        connect("tcp://127.0.0.1:9", timeout=1.0)
+    with pytest.raises(
+        dask_cluster.ClusterError, match=r"no dask scheduler answers at tcp://127.0.0.1:9 "
+    ):
+        dask_cluster.connect("tcp://127.0.0.1:9", timeout=1.0)
     assert time.monotonic() - begun < 5.0
     for address in ("node", "http://127.0.0.1:80", ""):
-        with pytest.raises(ClusterError, match="no dask scheduler answers at"):
-            connect(address, timeout=1.0)
+        with pytest.raises(dask_cluster.ClusterError, match="no dask scheduler answers at"):
+            dask_cluster.connect(address, timeout=1.0)
 
 
 def test_a_port_that_accepts_and_says_nothing_is_not_waited_for():
@@ -433,15 +436,15 @@ def test_a_port_that_accepts_and_says_nothing_is_not_waited_for():
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
         words = rf"answers at {address} \(no answer within 1 s\)"
-        with pytest.raises(ClusterError, match=words):
-            connect(address, timeout=1.0)
+        with pytest.raises(dask_cluster.ClusterError, match=words):
+            dask_cluster.connect(address, timeout=1.0)
 
 
 @pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning")
 def test_an_address_without_a_port_leaves_no_half_made_client():
     """One would print a traceback when it is collected."""
-    with pytest.raises(ClusterError, match="missing port number in address 'node7'"):
-        connect("node7", timeout=1.0)
+    with pytest.raises(dask_cluster.ClusterError, match="missing port number in address 'node7'"):
+        dask_cluster.connect("node7", timeout=1.0)
     gc.collect()
 
 
@@ -457,22 +460,28 @@ def test_workers_and_schedulers_that_are_gone(tmp_path, monkeypatch):
     try:
         wait_until(lambda: file.exists() and file.read_text().endswith("}"))
         address = json.loads(file.read_text())["address"]
-        with connect(address) as client:
-            with pytest.raises(ClusterError, match=f"has no workers.*dask worker {address}"):
-                run_on(client, bob(), POINTS, PLACES)
+        with dask_cluster.connect(address) as client:
+            with pytest.raises(
+                dask_cluster.ClusterError, match=f"has no workers.*dask worker {address}"
+            ):
+                dask_cluster.run_on(client, bob(), POINTS, PLACES)
             with worker_of(address):
                 client.wait_for_workers(1, timeout=60)
-                found = run_on(client, bob(), POINTS, np.arange(200), chunk=1)
+                found = dask_cluster.run_on(client, bob(), POINTS, np.arange(200), chunk=1)
                 next(found)
-            with pytest.raises(ClusterError, match=f"{address} has lost all its workers"):
+            with pytest.raises(
+                dask_cluster.ClusterError, match=f"{address} has lost all its workers"
+            ):
                 collected(found)
             with worker_of(address):
                 client.wait_for_workers(1, timeout=60)
-                found = run_on(client, bob(), POINTS, np.arange(200), chunk=1)
+                found = dask_cluster.run_on(client, bob(), POINTS, np.arange(200), chunk=1)
                 next(found)
                 monkeypatch.setattr(dask_cluster, "POLL_SECONDS", 0.0)  # it is asked when it dies
                 process.kill()
-                with pytest.raises(ClusterError, match=f"the scheduler at {address} is gone"):
+                with pytest.raises(
+                    dask_cluster.ClusterError, match=f"the scheduler at {address} is gone"
+                ):
                     collected(found)
     finally:
         process.kill()
@@ -483,28 +492,28 @@ def test_a_client_that_is_closed_meanwhile(client):
     """Nothing can be asked of it, nor be told to it; so is one that was closed before."""
     from distributed import as_completed
 
-    with connect(client.scheduler.address) as mine:
-        found = run_on(mine, bob(), POINTS, np.arange(200), chunk=1)
+    with dask_cluster.connect(client.scheduler.address) as mine:
+        found = dask_cluster.run_on(mine, bob(), POINTS, np.arange(200), chunk=1)
         next(found)
         watch, silent = dask_cluster._ClusterMonitor(mine), as_completed(loop=mine.loop)
         mine.close()
-        with pytest.raises(ClusterError, match=r"the scheduler at .* is gone"):
+        with pytest.raises(dask_cluster.ClusterError, match=r"the scheduler at .* is gone"):
             collected(found)
-        with pytest.raises(ClusterError, match=r"the scheduler at .* is gone"):
+        with pytest.raises(dask_cluster.ClusterError, match=r"the scheduler at .* is gone"):
             watch.wait(silent)  # of tasks that were being fetched dask does not speak any more
-        with pytest.raises(ClusterError, match=r"the scheduler at .* is gone"):
-            run_on(mine, bob(), POINTS, PLACES)
+        with pytest.raises(dask_cluster.ClusterError, match=r"the scheduler at .* is gone"):
+            dask_cluster.run_on(mine, bob(), POINTS, PLACES)
 
 
 def test_what_is_no_client_is_refused(client):
     for chunk in (0, -1, 2.5, True):
         with pytest.raises(dap.SceneError, match=r"chunk = .*a whole number of points from 1"):
-            run_on(client, bob(), POINTS, PLACES, chunk=chunk)
+            dask_cluster.run_on(client, bob(), POINTS, PLACES, chunk=chunk)
     with pytest.raises(dap.SceneError, match=r"client = .*a distributed\.Client"):
-        run_on("tcp://127.0.0.1:8786", bob(), POINTS, PLACES)
+        dask_cluster.run_on("tcp://127.0.0.1:8786", bob(), POINTS, PLACES)
 
 
 def test_without_dask_there_is_one_sentence(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(ClusterError, match="pip install cloudpickle dask distributed"):
-        connect("tcp://127.0.0.1:8786")
+    with pytest.raises(dask_cluster.ClusterError, match="pip install cloudpickle dask distributed"):
+        dask_cluster.connect("tcp://127.0.0.1:8786")

@@ -9,14 +9,16 @@ from xml.etree import ElementTree
 
 import pytest
 from support.command_line import output_of
+from support.internals import hooks
 from support.outside import isolated, pip
 from support.process import environment
 
 import dap3d_core as dap
-from dap3d_core.interface.hooks import EXTENSIONS, GROUPS
 
 #: Kind -> the file that the package brings to try it.
-SAMPLES = dict.fromkeys((*GROUPS, *EXTENSIONS), "scene.toml") | {"importer": "model.type"}
+SAMPLES = dict.fromkeys((*hooks.GROUPS, *hooks.EXTENSIONS), "scene.toml") | {
+    "importer": "model.type"
+}
 
 
 def new_plugin(folder, *words):
@@ -42,7 +44,7 @@ def test_the_package_is_complete(kind, tmp_path):
     assert project["project"]["entry-points"] == {f"dap3d.{kind}s": {"My.own-Type": module}}
     (dependency,) = project["project"]["dependencies"]
     source = folder / "src" / module / "__init__.py"
-    if kind in GROUPS:
+    if kind in hooks.GROUPS:
         type_info = dap.load_registry().with_file(source).get(kind, "My.own-Type")
         assert bool(type_info.derived) == dependency.startswith("dap3d[derive]>=")
         assert type_info.type.__name__ == "MyOwnType"
@@ -117,7 +119,7 @@ def test_the_packages_install_and_their_tests_pass(tmp_path):
     paths = environment(PYTHONPATH=os.pathsep.join([str(site), os.environ.get("PYTHONPATH", "")]))
     tests = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *SAMPLES]
     checks = [sys.executable, "-m", "dap3d_core.cli", "check-plugin", "-q"]
-    for words in (tests, [*checks, *(f"my-{kind}" for kind in EXTENSIONS)]):
+    for words in (tests, [*checks, *(f"my-{kind}" for kind in hooks.EXTENSIONS)]):
         done = subprocess.run(words, cwd=tmp_path, env=paths, capture_output=True, text=True)
         assert done.returncode == 0, done.stdout + done.stderr
 

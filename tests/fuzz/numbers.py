@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from hypothesis import strategies as st
 from support.ended import EndedError
-from support.internals import Checkpoint, read_checkpoint, write_checkpoint, write_checksums
+from support.internals import Checkpoint, checksum, read_checkpoint, write_checkpoint
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError
@@ -177,7 +177,7 @@ def make(change, place):
         else:
             variable = dataset.variables[what]
             variable[...] = _changed(np.asarray(variable[...]), where, value)
-    write_checksums(path, path.stat().st_size, is_whole=True)
+    checksum.write_checksums(path, path.stat().st_size, is_whole=True)
     return path
 
 

@@ -16,7 +16,7 @@ EXPECTED = {
 }
 #: Of forty loops, stiff, and of hundreds of steps with contacts.
 LONG = {"A02-40", "A05", "domino_row", "marble_run"}
-LONGEST = {"walker", "sphere_box"}  # fifty thousand steps; 500 balls to 1e-7
+LONGEST = {"walker", "sphere_box", "humanoid"}  # thousands of steps; 500 balls to 1e-7
 COUNTS = ("rows", "rank", "dof")
 
 
@@ -120,3 +120,13 @@ def test_the_walker_sets_out():
     for name in ("trunk.r.x", "trunk.r.y"):
         assert np.ptp(result.quantity(name).values) < 1e-9
     assert all(entry.ok for entry in result.ledger.values())
+
+
+@pytest.mark.slow
+def test_the_humanoid_leans_to_neither_side():
+    """Half a second of it: both of its sides are alike, and its feet stay where they stand."""
+    result = dap.simulate("humanoid", t_end=0.5, dt=0.1)
+    assert np.ptp(result.quantity("trunk.r.y").values) < 1e-12
+    assert all(result.ledger[name].ok for name in ("residual", "overlap", "position"))
+    left, right = (result.quantity(f"{side}_foot.r").values for side in ("left", "right"))
+    assert left * [1, -1, 1] == pytest.approx(right, abs=1e-12)

@@ -13,6 +13,7 @@ from support.internals import (
     Checkpoint,
     IntegrationState,
     RadauState,
+    formulas,
     read_checkpoint,
     write_checkpoint,
 )
@@ -20,7 +21,6 @@ from support.results import same_run
 
 import dap3d_core as dap
 from dap3d_core.cli import main
-from dap3d_core.integrators.adams.formulas import AdamsState
 from dap3d_core.simulation import CheckpointError, CompiledModel
 
 
@@ -29,7 +29,7 @@ def crafted(run, what, where, value):
     return check_change(json.dumps(["checkpoint", run, what, where, value]).encode())
 
 
-INTEGERS = RadauState.indices("integer") | AdamsState.indices("integer")
+INTEGERS = RadauState.indices("integer") | formulas.AdamsState.indices("integer")
 #: Integers that only count, and so hold any count.
 COUNTS = {
     "step_count", "rejected_count", "rhs_count", "projection_count", "report_count",
@@ -67,15 +67,21 @@ def test_the_command_refuses_it_as_any_damaged_file(tmp_path, capsys):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("run", "state"), [("pen1", IntegrationState), ("adams", AdamsState), ("radau", RadauState)]
+    ("run", "state"),
+    [("pen1", IntegrationState), ("adams", formulas.AdamsState), ("radau", RadauState)],
 )
-def test_every_integer_that_is_no_count_is_limited(run, state):
+def test_every_integer_that_is_no_count_is_limited(run, state, tmp_path):
+    """In one process, which a file that is not refused would end, or make fail."""
     indices = state.indices("integer")
     size = read_checkpoint(folder() / run / "run.nc.checkpoint").arrays["0.integer"].size
     assert list(indices.values()) == list(range(size))
+    paths = []
     for name, place in indices.items():
         value = -(10**7) if name in COUNTS else 10**7
-        assert crafted(run, "0.integer", place, value) == "checkpoint refused", place
+        paths.append(make(["checkpoint", run, "0.integer", place, value], tmp_path / name))
+    answer, ending = in_child(_refusals_of, paths, 60.0)
+    assert not ending, ending
+    assert answer[0], answer[1]
 
 
 @pytest.mark.parametrize(
@@ -103,6 +109,11 @@ def test_settings_that_no_run_has_are_refused(path, value, tmp_path):
     answer, ending = in_child(_words_of_refusal, found, PATIENCE)
     assert not ending
     assert "cannot resume from" in answer[1], answer[1]
+
+
+def _refusals_of(paths):
+    for path in paths:
+        assert str(path) in _words_of_refusal(path)
 
 
 def _words_of_refusal(path):

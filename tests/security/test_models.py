@@ -4,10 +4,10 @@ import os
 import sys
 
 import pytest
+from support.internals import source_files
 from support.process import REPOSITORY
 
 import dap3d_core as dap
-from dap3d_core.formats.import_scene import source_files
 from dap3d_core.interface.formats import xml_tree
 
 ARM = (REPOSITORY / "tests" / "data" / "formats" / "arm.urdf").read_text()

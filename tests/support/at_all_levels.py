@@ -7,18 +7,17 @@ from types import SimpleNamespace
 import numpy as np
 from hypothesis import strategies as st
 
-from dap3d_core.kernels.compiler.objects import OPTIMISED, UNOPTIMISED, compile_ir, load, processor
-from support.internals import Entry, Program
+from support.internals import Program, objects, units
 
 _count = count()
 
 
 def targets():
     """Level and processor of each kind of code, by its name."""
-    plain = processor()._replace(name="x86-64", features="")
-    found = {"O0": (UNOPTIMISED, None), "O3": (OPTIMISED, None)}
-    if processor().triple.startswith("x86_64"):
-        found["O3 without FMA"] = (OPTIMISED, plain)
+    plain = objects.processor()._replace(name="x86-64", features="")
+    found = {"O0": (objects.UNOPTIMISED, None), "O3": (objects.OPTIMISED, None)}
+    if objects.processor().triple.startswith("x86_64"):
+        found["O3 without FMA"] = (objects.OPTIMISED, plain)
     return found
 
 
@@ -27,9 +26,9 @@ def all_made_of(text, signatures, levels=None):
     found = {}
     for name in levels or targets():
         level, target = targets()[name]
-        addresses = load(compile_ir(text, level, target), list(signatures))
+        addresses = objects.load(objects.compile_ir(text, level, target), list(signatures))
         unit = SimpleNamespace(addresses=addresses, register_slot=addresses_of(addresses))
-        entries = (Entry(unit, k, s) for k, s in enumerate(signatures.values()))
+        entries = (units.Entry(unit, k, s) for k, s in enumerate(signatures.values()))
         found[name] = dict(zip(signatures, entries, strict=True))
     return found
 

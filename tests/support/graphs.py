@@ -6,8 +6,7 @@ share). The static order relies on that."""
 
 import numpy as np
 
-from dap3d_core.linear.ldlt.factor import assemble, factor, solve_saddle
-from support.internals import make_plan
+from support.internals import assemble, factor, make_plan, solve_saddle
 from support.plain import jit_is_on
 
 

@@ -2,7 +2,7 @@
 
 import dap3d_core as dap
 from dap3d_core.registry import Registry
-from dap3d_core.registry.discovery import Source
+from support.internals import discovery
 
 
 def registry_of(*types):
@@ -11,5 +11,5 @@ def registry_of(*types):
     for type_ in types:
         kind = "contact" if getattr(type_, "is_contact", False) else type_.kind
         key = (kind, type_.keyword)
-        sources.setdefault(key, []).append(Source(*key, type_.__module__, type=type_))
+        sources.setdefault(key, []).append(discovery.Source(*key, type_.__module__, type=type_))
     return Registry(sources)

@@ -14,8 +14,6 @@ import attrs
 import numpy as np
 
 from dap3d_core.kernels.runtime import cache
-from dap3d_core.kernels.runtime.lanes import Differentiation
-from dap3d_core.kernels.runtime.source_digest import COMPILED_LAYERS
 from support.at_all_levels import all_made_of, function_of, same_bits, targets
 from support.internals import (
     COMPLEX,
@@ -28,19 +26,18 @@ from support.internals import (
     Arrays,
     Compiled,
     CompileError,
-    Entry,
-    Functions,
+    Differentiation,
     Known,
     Program,
     Signature,
     Table,
     Tuple,
-    address_of,
     array_members,
     differentiate,
     pointer,
+    source_digest,
     trace,
-    type_of,
+    units,
 )
 
 #: The calls of a function that are recorded in each scene, from 1: early ones and some later ones.
@@ -106,7 +103,7 @@ class Recorder:
 
 def all_compiled_functions():
     """The compiled functions of the core's floors."""
-    for floor in COMPILED_LAYERS:
+    for floor in source_digest.COMPILED_LAYERS:
         package = importlib.import_module(f"dap3d_core.{floor}")
         for info in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
             module = importlib.import_module(info.name)
@@ -158,7 +155,7 @@ def compiled_type(value, parameter):
         return Tuple(tuple(map(Known, value)))
     if isinstance(value, complex):
         return COMPLEX
-    type_ = type_of(value)
+    type_ = units.type_of(value)
     return FLOAT if type_ == INT and parameter.annotation is float else type_
 
 
@@ -219,14 +216,28 @@ def exported(program, function, before, index):
     return symbol, signature, variable
 
 
-def differences(calls, levels=None):
+class Translated:
+    """What is translated of recorded calls: each function once, whatever is compared of it."""
+
+    def __init__(self):
+        self.program, self.signatures = Program(), {}
+        #: Of calls by function and kinds of arguments: what ``exported`` returns.
+        self.wrappers = {}
+        #: Symbols of the compiled functions that stand in tables.
+        self.items = {}
+
+
+def differences(calls, levels=None, translated=None):
     """Recorded calls that compiled code answers in other bits: functions and levels.
 
     Args:
         calls: of a recorder.
         levels: some of ``targets``; all where it is None.
+        translated: what other comparisons have translated, which is not done again.
     """
-    program, wrappers, signatures, items = Program(), {}, {}, {}
+    translated = translated or Translated()
+    program, wrappers = translated.program, translated.wrappers
+    signatures, items, loops = translated.signatures, translated.items, {}
     for function, before, _, _ in calls:
         key = function, tuple(map(kind, before))
         if key not in wrappers:
@@ -239,18 +250,18 @@ def differences(calls, levels=None):
                     signatures[items[item]] = program.export(
                         item, table.signature.arguments, items[item]
                     )
-                elif isinstance(item, Entry):  # a differentiated loop, compiled as it is
-                    items[id(item)] = item, dict.fromkeys((*targets(), DIFFERENTIATED), item)
-                elif not isinstance(item, Compiled) and id(item) not in items:
+                elif isinstance(item, units.Entry):  # a differentiated loop, compiled as it is
+                    loops[id(item)] = item, dict.fromkeys((*targets(), DIFFERENTIATED), item)
+                elif not isinstance(item, Compiled) and id(item) not in loops:
                     made = made_at(loop_text(item), {"loop": LOOP}, levels)
-                    items[id(item)] = item, {level: e["loop"] for level, e in made.items()}
+                    loops[id(item)] = item, {level: e["loop"] for level, e in made.items()}
     found = set()
     for level, entries in made_at(program.module(), signatures, levels).items():
 
         def compiled_table(table, level=level, entries=entries):
-            made = (entries[items[f]] if isinstance(f, Compiled) else items[id(f)][1][level]
+            made = (entries[items[f]] if isinstance(f, Compiled) else loops[id(f)][1][level]
                     for f in table)  # fmt: skip
-            return Functions(table.signature, list(made))
+            return units.Functions(table.signature, list(made))
 
         for function, before, after, result in calls:
             symbol, signature, variable = wrappers[function, tuple(map(kind, before))]
@@ -285,7 +296,7 @@ def is_by_array(value, type_):
 def computes_values_alone(function, arguments):
     """Whether a function calls loops that are differentiated already, or may."""
     if function.__name__ == "call_loop":
-        return isinstance(arguments[0][arguments[1]], Entry)
+        return isinstance(arguments[0][arguments[1]], units.Entry)
     of_steps = function.__module__.endswith("radau.step")
     return function.__name__ in OF_TANGENTS or (of_steps and "tangents" in named(function))
 
@@ -323,7 +334,7 @@ def call_differentiated(entry, arguments):
             if own and value.size:
                 slopes = holder.slopes(value)
                 slopes[:] = rng.standard_normal(slopes.shape)
-            address = address_of(holder.matrix(value) if own else value)
+            address = units.address_of(holder.matrix(value) if own else value)
             return [address, *value.shape[: type_.ndim]]
         if isinstance(value, Arrays):
             return [carried.wide(value).address]

@@ -40,10 +40,19 @@ def test_flight_and_bounce_by_restitution_and_height():
 
 
 @pytest.mark.slow
-def test_a_ball_that_slides_then_rolls_by_friction():
-    """It rolls from 2 v / (7 mu g) on: x' = v t1' - ..., by hand."""
+@pytest.mark.parametrize(
+    "settings",
+    [{}, {"integrator": "radau"}, {"integrator": "radau", "method": "joint"}],
+    ids=["dop853", "radau", "radau-joint"],
+)
+def test_a_ball_that_slides_then_rolls_by_friction(settings):
+    """It rolls from 2 v / (7 mu g) on: x' = v t1' - ..., by hand.
+
+    The iteration of radau stops at once, at the values of a uniform deceleration.
+    """
     v, mu, t_end = 3.0, 0.3, 2.0
-    found = dap.sensitivities(ball(v=v, mu=mu), ["contacts.floor.mu"], t_end=t_end, dt=0.5, **TIGHT)
+    settings = TIGHT | settings | {"t_end": t_end, "dt": 0.5}
+    found = dap.sensitivities(ball(v=v, mu=mu), ["contacts.floor.mu"], **settings)
     t1 = 2.0 * v / (7.0 * mu * G)
     # x = v t1 - mu g t1^2 / 2 + 5/7 v (t_end - t1), with v - mu g t1 = 5/7 v at t1
     exact = -0.5 * G * t1**2

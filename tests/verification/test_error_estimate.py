@@ -27,7 +27,7 @@ CASES = {
     "A02-1": dict(t_end=0.7, dt=0.01),
     "A03": {},
     "A04": {},
-    "A05": dict(t_end=0.5, dt=0.005),
+    "A05": dict(t_end=0.2, dt=0.005),
     "N1": {},
     "A01": dict(t_end=10.0, dt=0.1),
     "G1": dict(t_end=10.0, dt=0.1),

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from support import problems
-from support.internals import RadauIntegration
 from support.process import REPOSITORY
 
 import dap3d_core as dap
-from dap3d_core.integrators import Status
+from dap3d_core.integrators import INTEGRATORS, Status
 
 sys.path.append(str(REPOSITORY / "benchmarks"))
 
@@ -127,8 +126,9 @@ def test_fixed_steps_are_of_order_five():
     u = compiled.start(True, ()).u
     evaluator = compiled.evaluator
     evaluator.start(0.0, u)
-    run = RadauIntegration(evaluator, evaluator.integrated(u), [0.0, 1.0], step=0.01,
-                           report_size=evaluator.report_size)  # fmt: skip
+    run = INTEGRATORS["radau"].make(
+        evaluator, evaluator.integrated(u), [0.0, 1.0], step=0.01, report_size=evaluator.report_size
+    )
     while run.status is Status.RUNNING:
         run.advance(10**9)
         run.rows()
@@ -143,7 +143,7 @@ def test_order_of_the_multipliers_of_the_stages():
     errors, held = [], []
     for n in (20, 40, 80):
         evaluator.start(0.0, u)
-        run = RadauIntegration(
+        run = INTEGRATORS["radau"].make(
             evaluator, evaluator.integrated(u), [0.0, 1.0], step=1.0 / n, rtol=1e-13, atol=1e-14,
             report_size=evaluator.report_size,
         )  # fmt: skip

@@ -11,7 +11,7 @@ from support.own_types import registry_of
 import dap3d_core as dap
 from dap3d_core.interface import Contact, Point, Vector, number, point, vector
 from dap3d_core.kernels import dot, scale, sub
-from dap3d_core.testing import check_type
+from dap3d_core.testing import check_type, checks_for
 
 G, R, M = 9.81, 0.1, 2.0
 I = 0.4 * M * R * R
@@ -152,21 +152,55 @@ class Wheel(Contact):
         return part_lost * radius, 0.0
 
 
+class Downhill(Wheel):
+    """Its length falls along x, and is zero at x = 0.5."""
+
+    keyword = "test-downhill"
+
+    def resist(r_P_i, part_lost):
+        return part_lost * (1.0 - 2.0 * r_P_i[0]), 0.0
+
+
+def scene_on_wheel(type_, v=1.0, **fields):
+    """A solid ball of a type of contact of one's own that rolls along x."""
+    scene = dap.Scene(name="wheel")
+    scene.add_body("wheel", mass=M, Jp=[I] * 3, r=[0, 0, R], r_dot=[v, 0, 0], w=[0, v / R, 0])
+    scene.add_contact(type_.keyword, "c", P_i="wheel.O", radius=R, mu=0.8, **fields)
+    scene.add_force("weight", "gravity", gravity=G)
+    return scene
+
+
+def wheel(type_, v=1.0, **fields):
+    """The same, compiled."""
+    return dap.compile(scene_on_wheel(type_, v, **fields), registry=registry_of(type_))
+
+
 @pytest.mark.parametrize(("contact", "limit"), [("events", 1e-9), ("stepping", 1e-6)])
 def test_a_type_of_one_s_own_says_what_resists(contact, limit):
     """Of steps of 2 ms the last is off by a part of a h^2 / 2, 3e-7 m."""
     v, a = 1.0, G * 0.02 / ROLLS
-    scene = dap.Scene(name="wheel")
-    scene.add_body("wheel", mass=M, Jp=[I] * 3, r=[0, 0, R], r_dot=[v, 0, 0], w=[0, v / R, 0])
-    scene.add_contact("test-wheel", "c", P_i="wheel.O", radius=R, mu=0.8)
-    scene.add_force("weight", "gravity", gravity=G)
-    compiled = dap.compile(scene, registry=registry_of(Wheel))
-    result = dap.simulate(compiled, t_end=8.0, dt=0.1, contact=contact, contact_step=2e-3)
+    result = dap.simulate(wheel(Wheel, v), t_end=8.0, dt=0.1, contact=contact, contact_step=2e-3)
     assert result.r[-1, 0, 0] == pytest.approx(0.5 * v**2 / a, abs=limit)
 
 
-def test_check_plugin_takes_it():
+def test_check_plugin_takes_lengths_that_are_not_negative_alone():
     assert check_type(Wheel).ok
+    words = "a negative length would drive"
+    (check,) = [check for check in checks_for(Downhill) if check.name == "resist"]
+    assert not check.run().ok
+    assert "for rolling: what resists by" in str(check.run())
+    assert words in str(check.run())
+
+
+@pytest.mark.parametrize("contact", ["events", "stepping"])
+def test_a_run_ends_where_a_length_becomes_negative(contact):
+    """v dv/dx = -a (1 - 2 x), a = 0.02 g / (1.4 R), up to x = 0.5; steps look every 2 ms."""
+    with pytest.raises(dap.SimulationError, match=r"contact c_roll would drive: .* is -"):
+        dap.simulate(wheel(Wheel, part_lost=-0.1), t_end=1.0, contact=contact)
+    with pytest.raises(dap.SimulationError, match="contact c_roll would drive") as error:
+        dap.simulate(wheel(Downhill), t_end=1.0, contact=contact, contact_step=2e-3, dt=1e-3)
+    x, h = error.value.result.r[-1, 0, 0], 1e-3 if contact == "events" else 3e-3
+    assert 0.5 - h < x < 0.5 + 1e-3
 
 
 def test_of_pairs_that_are_not_named_the_mean_counts_and_the_pair_where_it_is():

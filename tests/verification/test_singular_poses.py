@@ -53,8 +53,11 @@ def test_four_bars_at_the_default_tolerances(count):
     ("count", "integrator"),
     [
         *product((1, 2), ("dop853", "dopri5")),
-        pytest.param(40, "dop853", marks=pytest.mark.slow),
-        pytest.param(40, "dopri5", marks=[pytest.mark.slow, pytest.mark.long]),
+        # of forty loops for releases: above they cross at the default tolerances
+        *(
+            pytest.param(40, name, marks=[pytest.mark.slow, pytest.mark.long])
+            for name in ("dop853", "dopri5")
+        ),
     ],
 )
 def test_four_bars_through_every_crossing(count, integrator):

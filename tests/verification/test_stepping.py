@@ -102,7 +102,7 @@ def test_a_cylinder_rolls_down_a_box():
                           radius=0.1, length=0.4, axis=[0, 1, 0])  # fmt: skip
     result = dap.simulate(scene, t_end=0.3, dt=0.3, contact_step=5e-3)
     assert down @ result.rd[-1, 0] == pytest.approx(2 / 3 * G * np.sin(0.3) * 0.3, rel=1e-13)
-    assert len(result.contacts) == 2  # the ends of the line along which it touches
+    assert len(result.contacts) == 4  # at both reports the ends of the line along which it touches
 
 
 def test_a_cylinder_that_stands_on_a_slanted_box_stays():
@@ -139,11 +139,24 @@ def test_forces_and_modes_of_declared_contacts_are_those_of_the_step():
     scene.add_force("weight", "gravity")
     result = dap.simulate(scene, t_end=0.4, dt=0.1, contact="stepping", contact_step=2e-3)
     floor = result.contact("floor")
-    assert floor.mode[1:].tolist() == [1, 1, 2, 2]  # to 0.291 s
-    assert floor.normal_force[1:] == pytest.approx(2.0 * G, rel=1e-12)
-    slides, rolls = floor.friction[1:3, 0], floor.friction[3:, 0]
+    assert floor.mode.tolist() == [1, 1, 1, 2, 2]  # to 0.291 s
+    assert floor.normal_force == pytest.approx(2.0 * G, rel=1e-12)
+    slides, rolls = floor.friction[:3, 0], floor.friction[3:, 0]
     assert slides == pytest.approx(-mu * 2.0 * G, rel=1e-12)
     assert rolls == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_first_report_has_the_forces_of_the_first_step():
+    """Of what rests on a slope, slides, or is far away."""
+    rests = dap.simulate(slope(), t_end=5e-3, dt=5e-3, contact_step=5e-3)
+    table = rests.contacts
+    assert table.force[table.t == 0.0].sum(0) == pytest.approx([0, 0, 2 * G], rel=1e-12, abs=1e-11)
+    slides = dap.simulate(ball(mu=0.3), t_end=5e-3, dt=5e-3, contact_step=5e-3)
+    assert slides.contacts.force[0] == pytest.approx([-0.6 * G, 0, 2 * G], rel=1e-12, abs=1e-11)
+    assert slides.rdd[0, 0] == pytest.approx([-0.3 * G, 0.0, 0.0], rel=1e-12, abs=1e-11)
+    apart = dap.simulate(ball(0.1), t_end=5e-3, dt=5e-3, contact_step=5e-3)
+    assert len(apart.contacts) == 0
+    assert apart.rdd[0, 0] == pytest.approx([0.0, 0.0, -G], rel=1e-12)
 
 
 def test_a_small_box_that_tumbles_bounces_as_a_large_one():
@@ -442,7 +455,7 @@ def test_times_that_differ_by_rounding_make_no_step_of_their_own():
     run = dap.simulate(scene, t_end=1.0, dt=0.02, contact="stepping", contact_step=1e-3)
     assert 0.7 not in run.t  # 0.7000000000000001
     # the floor's acceleration is at most 5.8 * 0.1 / 0.5^2 = 2.3 m/s^2
-    assert np.all(np.abs(run.contact("under").normal_force[1:] - 0.981) < 0.24)
+    assert np.all(np.abs(run.contact("under").normal_force - 0.981) < 0.24)
 
 
 def test_a_servo_that_is_fast_for_the_step_makes_it_shorter():

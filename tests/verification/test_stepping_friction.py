@@ -25,9 +25,9 @@ def test_a_loaded_hinge_does_not_creep():
     result = dap.simulate(loaded(0.999)[0], t_end=60.0, dt=30.0, **STEPS)
     assert abs(result.quantity("pin.angle").values[-1]) < 1e-14
     rub = result.contact("rub")
-    assert list(rub.mode[1:]) == [2, 2]
+    assert list(rub.mode) == [2, 2, 2]
     assert result.ledger["contact work"].ok
-    assert rub.normal_force[1:] == pytest.approx(0.02 * 5.0 * G / 0.02, rel=1e-12)
+    assert rub.normal_force == pytest.approx(0.02 * 5.0 * G / 0.02, rel=1e-12)
 
 
 def test_a_coulomb_oscillator_rests_where_it_should():

@@ -145,6 +145,20 @@ def with_slopes(x: float, source: float) -> float:
     return x
 
 
+@intrinsic("slope")
+def slope(x: float, k: int) -> float:
+    """Derivative k of a number where code is differentiated, else zero: for iterations that stop
+    by the derivatives of what they find. Values may not depend on it.
+    """
+    return 0.0
+
+
+@intrinsic("slope_count")
+def slope_count() -> int:
+    """How many derivatives numbers have: none where code is not differentiated."""
+    return 0
+
+
 @intrinsic("is_differentiated")
 def is_differentiated() -> bool:
     """True where code is differentiated: iterations then make one pass more, for derivatives."""

@@ -124,11 +124,6 @@ class Model:
         return tuple(self.joint_names[len(self.joint_names) - self.contact_count :])
 
     @property
-    def resists_turning(self) -> bool:
-        """True if declared contacts resist that bodies roll or spin."""
-        return any(group.type_info.type.resists for group in self.contacts)  # type: ignore[attr-defined]
-
-    @property
     def contacts(self) -> tuple[Group, ...]:
         """Groups of joints that are contacts."""
         return tuple(group for group in self.joints if group.type_info.type.is_contact)

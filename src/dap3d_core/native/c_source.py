@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.assembly.metric import METRIC_WIDTH
+from dap3d_core.formulations import REPORT
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.jumps.jump_arrays import CROSSING, SIDE, JumpArrays
 from dap3d_core.integrators.stepping import integration_state as at
@@ -19,7 +20,7 @@ from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, V, 
 from dap3d_core.native.run.directions import Directions, PairEntry, PairUnit
 from dap3d_core.native.run.elements import Elements
 from dap3d_core.native.run.outputs import Output
-from dap3d_core.native.run.prepared import Advance, ContactCode, JumpCode, PreparedRun
+from dap3d_core.native.run.prepared import Advance, ContactCode, PreparedRun
 from dap3d_core.simulation.events import contact_jumps
 from dap3d_core.study.batch import initial_state
 
@@ -111,10 +112,14 @@ def symbol_of(entry: Entry | PairEntry) -> str:
 
 def units_of(prepared: PreparedRun, directions: Directions | None) -> dict[Unit | PairUnit, bool]:
     """The units of compiled code that a run calls, and whether its steps do."""
-    entries: list[Entry | PairEntry] = list(prepared.image.functions.values())
+    image, start = prepared.image, prepared.start
+    rare: list[Entry | PairEntry] = [*start.functions.entries] if start else []
+    entries: list[Entry | PairEntry] = [e for e in image.functions.values() if e not in rare]
     for one in prepared.advances:
         entries += [one.entry] if one.completes is None else [one.entry, one.completes]
-    rare: list[Entry | PairEntry] = [prepared.jumps.entry] if prepared.jumps else []
+    law = prepared.jumps
+    rare += [law.entry] if law else []
+    rare += [law.follows] if isinstance(law, ContactCode) and law.follows else []
     rare += directions.entries if directions else []
     found = {entry.unit.name: (entry.unit, False) for entry in rare}
     found |= {entry.unit.name: (entry.unit, True) for entry in entries}
@@ -180,6 +185,9 @@ def _numbers(prepared: PreparedRun, variables: Sequence[Variable]) -> list[str]:
         "INTEGRATIONS": len(prepared.advances),
         "STOPS": len(prepared.stops),
         "FUNCTIONS": image.at(prepared.functions),
+        "REPORT_CODE": symbol_of(prepared.functions.entries[REPORT]),
+        # the iteration for forces on reactions begins with what was reported last
+        "REPORTS": int(bool(prepared.evaluator.model.iterated_forces or prepared.jumps)),
         "SYSTEM": image.at(system),
         "LOOPS": image.at(prepared.evaluator.loops),
         "BODIES": image.at(system.body),
@@ -272,11 +280,12 @@ def _completion(prepared: PreparedRun) -> list[str]:
     if one.completes is None:
         return ["#define COMPLETES 0"]
     symbol = symbol_of(one.completes)
-    given = ", ".join(f"w + {prepared.image.at(part)}" for part in one.arguments[:2])
+    types = ", ".join(["void *"] * len(one.arguments))
+    given = ", ".join(f"w + {prepared.image.at(part)}" for part in one.arguments)
     return [
         "#define COMPLETES 1",
         f"#define PUSHED {prepared.image.at(one.arguments[0].pushed)}",
-        f"void {symbol}(void *, void *, double *, int64_t);",
+        f"_Bool {symbol}({types}, double *, int64_t);",
         f"static void complete(int64_t *w, double *row) {{ {symbol}({given}, row, ROW); }}",
     ]
 
@@ -306,7 +315,7 @@ def _jumps(prepared: PreparedRun) -> list[str]:
         "ELEMENTS": j.acting.size,
         "DOES_JUMP": place(j.jumps),
     }
-    return [*_defined(numbers), *_law("void", "jump_law", law, place)]
+    return [*_defined(numbers), *_law("void", "jump_law", law.entry, law.arguments, place)]
 
 
 def _contacts(law: ContactCode, place: Callable[[Any], int]) -> list[str]:
@@ -319,16 +328,17 @@ def _contacts(law: ContactCode, place: Callable[[Any], int]) -> list[str]:
     return [
         *_defined(numbers),
         *_table("static const char *const contact_names[]", map(c_text, law.names)),
-        *_law("int64_t", "contact_law", law, place),
+        *_law("int64_t", "contact_law", law.entry, law.arguments, place),
+        *(_law("void", "follow_drivers", law.follows, law.arguments[:3], place) if law.follows else []),
     ]
 
 
 def _law(
-    result: str, name: str, law: JumpCode | ContactCode, place: Callable[[Any], int]
+    result: str, name: str, entry: Entry, arguments: Sequence[Any], place: Callable[[Any], int]
 ) -> list[str]:
-    """A C function that calls a law on the arrays of a run."""
-    symbol, types = symbol_of(law.entry), ", ".join(["void *"] * len(law.arguments))
-    given = ", ".join(f"w + {place(part)}" for part in law.arguments)
+    """A C function that calls a function of time on the arrays of a run."""
+    symbol, types = symbol_of(entry), ", ".join(["void *"] * len(arguments))
+    given = ", ".join(f"w + {place(part)}" for part in arguments)
     call = f"{'' if result == 'void' else 'return '}{symbol}(t, {given})"
     return [
         f"{result} {symbol}(double, {types});",

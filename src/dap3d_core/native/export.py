@@ -96,6 +96,7 @@ def export_native(
     given = scene if isinstance(scene, Scene) else load(scene)
     options = {"allow_code": allow_code, "registry": registry} | settings
     prepared = PreparedRun(given, **options)
+    prepared.may_start_anew &= bool(parameters)
     given_outputs = outputs_of(prepared, outputs)
     left_out = given_outputs.left_out
     if strict and left_out:

@@ -83,6 +83,7 @@ class NativeRun:
     def __init__(self, library: NativeLibrary, t_end: float) -> None:
         """Args: the library, and the end of the run, s."""
         self._library, self._call = library, library.functions
+        self._step_to = self._call.dap3d_step_to
         self._model = self._call.dap3d_create(float(t_end))
         if not self._model:
             raise ValueError(f"t_end is {t_end!r}; it should be a positive number of seconds, or 0")
@@ -130,8 +131,8 @@ class NativeRun:
         Raises:
             SimulationError: the run cannot go on.
         """
-        result = self._call.dap3d_step_to(self._model, float(t))
-        if result not in (OK, ENDED):
+        result = self._step_to(self._model, t)
+        if result != OK and result != ENDED:
             raise SimulationError(self.message)
         return bool(result == OK)
 

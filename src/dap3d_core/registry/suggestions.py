@@ -17,7 +17,7 @@ _OTHER_NAMES = {
     "r": "position pos xyz origin location x",
     "p": "orientation quaternion quat euler_parameters q rotation",
     "rpy": "euler euler_angles angles",
-    "r_dot": "velocity vel v",
+    "r_dot": "rd velocity vel v",
     "w": "angular_velocity angvel omega",
     "k": "stiffness spring_constant spring_rate",
     "c": "damping damping_coefficient",

@@ -42,11 +42,6 @@ def refuse_collisions(model: Any, what: str) -> None:
             f"({model.collisions.names[0]}): leave collides = true out, or run the scene "
             "(simulate), which does"
         )
-    if model.resists_turning:
-        raise SimulationError(
-            f"{what} does not take contacts that resist rolling or spinning yet: leave mu_roll and "
-            "mu_spin out, or run the scene (simulate), which does"
-        )
     refuse_breaks(model, what)
 
 

@@ -191,6 +191,8 @@ def _of_joint(subject: SampledType) -> list[Check]:
         checks.append(Check("normal", subject, "", elements.normal))
     if subject.type.is_contact and subject.type.grip is not None:
         checks.append(Check("grip", subject, "", elements.grip))
+    if subject.type.is_contact and subject.type.resist is not None:
+        checks.append(Check("resist", subject, "", elements.resist))
     checks += _of_jumps(subject)
     if "friction" in subject.type_info.kernels:
         checks.append(Check("friction power", subject, "", _on_friction(forces.dissipation)))

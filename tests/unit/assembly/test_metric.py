@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
-from support.internals import BODY_WIDTH, A, P, compiled
+from support.internals import BODY_WIDTH, A, P, compiled, gyroscopic_moment, orient_by_state
 from support.rotations import rotation
-
-from dap3d_core.assembly.metric import gyroscopic_moment, orient_by_state
 
 
 @compiled

@@ -15,10 +15,15 @@ import click
 import pytest
 from support.command_line import dap3d
 from support.internals import (
+    HEADER_KEYS,
     INTEGRATORS,
     METHODS,
+    NAMED,
+    TABLES,
+    Animation,
     BodyPose,
     described,
+    hooks,
     sample_classes,
     sized_fields,
     specs_of,
@@ -27,7 +32,6 @@ from support.process import REPOSITORY
 
 import dap3d_core as dap
 from dap3d_core import interface, kernels
-from dap3d_core.interface import hooks
 from dap3d_core.interface.codegen.instance_layout import layout_of
 from dap3d_core.interface.codegen.kernel_arguments import (
     SLIP,
@@ -37,7 +41,6 @@ from dap3d_core.interface.codegen.kernel_arguments import (
 )
 from dap3d_core.scene import Simulation
 from dap3d_core.scene.coerce import keys_of
-from dap3d_core.scene.tables import HEADER_KEYS, NAMED, TABLES, Animation
 
 DOCS = REPOSITORY / "docs"
 #: Members of a class that have docstrings of their own.

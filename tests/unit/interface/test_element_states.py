@@ -1,11 +1,10 @@
 """Fields that states bring, and words that no state may have."""
 
-from support.internals import COORDINATE, specs_of
+from support.internals import COORDINATE, QUANTITIES, specs_of
 from support.state_types import Lag, Maxwell
 
 from dap3d_core.interface import Body, Force, body, number
 from dap3d_core.interface.element_states import _OF_RESULTS, state_lengths
-from dap3d_core.result.quantities.catalogue import QUANTITIES
 
 
 def test_states_bring_the_fields_of_their_initial_values_and_tolerances():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from support.graphs import chain, star
-from support.internals import compiled, order_nodes
+from support.internals import compiled, make_plan
 
 from dap3d_core.linear.lu import factor_lu, make_lu_plan, solve_lu
 
@@ -16,7 +16,7 @@ def factor_and_solve(nodes, columns, updates, K, pivots, x):
 
 
 def lu_of(body_count, slots, rows, coupled=()):
-    nodes = order_nodes(body_count, slots, rows).nodes
+    nodes = make_plan(body_count, slots, rows).ordering.nodes
     return nodes, make_lu_plan(body_count, nodes, [*slots, *coupled])
 
 

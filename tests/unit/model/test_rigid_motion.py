@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 from scipy.linalg import expm
-from support.rotations import rotation, to_global
-
-from dap3d_core.model.rigid_motion import (
+from support.internals import (
     Pose,
     adjoint,
     compose,
@@ -18,6 +16,7 @@ from dap3d_core.model.rigid_motion import (
     skew,
     turned,
 )
+from support.rotations import rotation, to_global
 
 
 def matrix(pose):

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from support.internals import euler_rates, roll_pitch_yaw, roll_pitch_yaw_rates
 
-from dap3d_core.model.rotations import euler_rates, roll_pitch_yaw, roll_pitch_yaw_rates
 from dap3d_core.scene.validate.coerce_values import from_rpy
 
 

@@ -1,15 +1,16 @@
 """Exported libraries by themselves: without Python, in threads, on other platforms."""
 
+import os
 import shutil
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 from support.binaries import macho_names, pe_names
 
 import dap3d_core as dap
 from dap3d_core.native import build
-from dap3d_core.native.build import own_platform
 
 THREADS = """
 #include <pthread.h>
@@ -84,7 +85,7 @@ def test_a_hundred_runs_in_eight_threads_are_clean_under_sanitizers(tmp_path, mo
         # the runtime as well as the program
         monkeypatch.setattr(build, "OPTIONS", (*options, f"-fsanitize={sanitizer}"))
         made = exported(tmp_path)
-        archive = made.path / own_platform() / "libpen1.a"
+        archive = made.path / build.own_platform() / "libpen1.a"
         program = tmp_path / sanitizer
         command = [compiler(), "-std=c11", "-g", f"-fsanitize={sanitizer}", "-DDAP3D_STATIC",
                    f"-I{made.path}", tmp_path / "threads.c", archive, "-lm", "-lpthread",
@@ -105,7 +106,7 @@ def test_it_runs_in_an_empty_root(tmp_path):
     made = exported(tmp_path)
     root = tmp_path / "root"
     root.mkdir()
-    archive = made.path / own_platform() / "libpen1.a"
+    archive = made.path / build.own_platform() / "libpen1.a"
     command = [compiler(), "-static", "-DDAP3D_STATIC", made.path / "example.c", archive, "-lm",
                "-o", root / "example"]  # fmt: skip
     if subprocess.run(command, capture_output=True, check=False).returncode:
@@ -130,7 +131,7 @@ def test_the_shared_library_needs_the_c_library_alone(tmp_path, optimised_librar
     run.step_to(0.5)
     result = dap.simulate("pen1", t_end=0.5, dt=0.5)
     assert [run[f"cone.r.{axis}"] for axis in "xyz"] == result.r[-1, 0].tolist()
-    library = made.path / own_platform() / "libpen1.so"
+    library = made.path / build.own_platform() / "libpen1.so"
     listed = subprocess.run(["readelf", "-dW", library], capture_output=True, text=True, check=True)
     needed = {line.split("[")[1].rstrip("]") for line in listed.stdout.splitlines()
               if "(NEEDED)" in line}  # fmt: skip
@@ -158,7 +159,7 @@ def test_the_compiler_of_a_machine_is_for_its_own_platform(tmp_path, monkeypatch
     monkeypatch.setattr(build.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(dap.SceneError, match="no libraries for windows-x86-64"):
         exported(tmp_path, platforms=["windows"])
-    assert exported(tmp_path).platforms == (own_platform(),)
+    assert exported(tmp_path).platforms == (build.own_platform(),)
 
 
 @pytest.mark.slow  # the first one makes the C libraries of the systems, some minutes
@@ -193,3 +194,28 @@ def test_libraries_of_other_platforms_are_linked_here(tmp_path, platform, begin)
     assert all(name.startswith("dap3d_") for name in names)
     assert "dap3d_outputs" not in names
     assert (made.path / platform / "libpen1.a").exists()
+
+
+@pytest.mark.slow  # the C library of Windows is made first, some minutes
+def test_a_program_for_windows_prints_under_wine_what_one_for_linux_does(tmp_path):
+    """Equal but for the last bits of sines and cosines, of which each C library has its own."""
+    pytest.importorskip("ziglang")
+    wine = shutil.which("wine64") or shutil.which("wine")
+    if wine is None:
+        pytest.skip("there is no wine")
+    made = exported(tmp_path, platforms=[own_platform(), "windows"])
+    tables = []
+    for name in made.platforms:
+        zig, program = build.PLATFORMS[name].zig, tmp_path / f"{name}.exe"
+        given = "-DDAP3D_STATIC", made.path / "example.c", made.path / name / "libpen1.a"
+        command = [sys.executable, "-m", "ziglang", "cc", "-target", zig, *given, "-lm", "-o"]
+        subprocess.run([*command, program], check=True)
+        loader = [wine] if name.startswith("windows") else []
+        prefix = os.environ | {"WINEPREFIX": str(tmp_path / "wine"), "WINEDEBUG": "-all"}
+        done = subprocess.run([*loader, program, "0.5", "10"], env=prefix, capture_output=True,
+                              text=True, check=True)  # fmt: skip
+        tables.append([line.split(",") for line in done.stdout.splitlines()])
+    (head, *rows), (names, *found) = tables
+    assert names == head
+    # rounding of numbers up to 10, in some 100 steps
+    np.testing.assert_allclose(np.array(found, float), np.array(rows, float), rtol=0, atol=1e-12)

@@ -7,12 +7,13 @@ from functools import partial
 import attrs
 import numpy as np
 import pytest
-from support.internals import placed_shapes
+from support.internals import contact_jumps, placed_shapes
+from support.own_types import registry_of
+from verification.test_rolling_resistance import Wheel, scene_on_wheel
 
 import dap3d_core as dap
 from dap3d_core.integrators.moreau import arrays
 from dap3d_core.native.build import own_platform
-from dap3d_core.simulation.events import contact_jumps
 
 SPRING = """
 [scene]
@@ -333,13 +334,18 @@ def falling_ball(**material):
     return scene
 
 
-def declared_ball():
+def declared_ball(speed=3.0, **resistance):
     """A ball that slides on a plane, then rolls; a declared contact."""
     scene = dap.Scene(name="declared")
-    scene.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=[0, 0, 0.1], r_dot=[3.0, 0, 0])
-    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1, mu=0.3)
+    motion = {"r_dot": [speed, 0, 0], "w": [0, 0, 3.0]}
+    scene.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=[0, 0, 0.1], **motion)
+    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1, mu=0.3, **resistance)
     scene.add_force("weight", "gravity")
     return scene
+
+
+#: It slides until 0.09 s, rolls, spins until 0.24 s, and rests at 0.26 s.
+RESISTING = partial(declared_ball, 0.5, mu_roll=0.02, mu_spin=0.005)
 
 
 @pytest.mark.every(3)
@@ -347,9 +353,10 @@ def declared_ball():
     (falling_ball, ["ball.rdd"], {}),
     (partial(falling_ball, mu_roll=0.01, mu_spin=0.01), ["ball.rdd"], {}),
     (declared_ball, ["ball.rdd"], {"contact": "stepping", "contact_step": 2e-3}),
+    (RESISTING, ["ball.rdd"], {"contact": "events", "integrator": "dop853"}),
     (lambda: dap.load("quadruped"), ["trunk.rdd", "front_left_hinge.i.force"], {}),
 ])  # fmt: skip
-def test_steps_of_contacts_have_the_bits_of_simulate(tmp_path, make, more, settings):
+def test_contacts_have_the_bits_of_simulate(tmp_path, make, more, settings):
     """Accelerations and loads of joints are means of the step here, too."""
     scene, t_end = make(), 0.3
     names = [*states_of(scene), *more]
@@ -430,6 +437,14 @@ def test_a_name_that_is_no_identifier(tmp_path):
     made = dap.export_model(scene, tmp_path / "out", format="c")
     (library,) = (made.path / own_platform()).glob("*.a")
     assert library.name == "lib_4_gr_en.a"
+
+
+@pytest.mark.parametrize("contact", ["events", "stepping"])
+def test_a_run_where_friction_would_drive_says_so(tmp_path, contact):
+    given = {"t_end": 1.0, "contact": contact, "registry": registry_of(Wheel)}
+    made = dap.export_model(scene_on_wheel(Wheel, part_lost=-0.1), tmp_path / "c", **given)
+    with pytest.raises(dap.SimulationError, match=r"friction .*is negative"):
+        dap.load_native(made.path).start(1.0).step_to(1.0)
 
 
 @pytest.mark.parametrize(("jams", "said"), [(-1, "rattle: slip jams again and again"),

@@ -2,11 +2,10 @@
 Plugins here are real distributions on sys.path: a module, and a dist-info with entry points."""
 
 import pytest
+from support.internals import extension_listing, extensions, packages
 
 import dap3d_core as dap
 from dap3d_core.interface import PluginError
-from dap3d_core.registry.extensions import extension_listing, extensions
-from dap3d_core.testing.packages import active_sources, check_named
 
 GOOD = '''
 from dap3d_core.interface.formats import Articulation, Importer, Inertial, Joint, Link, hookimpl
@@ -183,6 +182,6 @@ def test_the_listing_has_what_is_blocked_and_what_two_packages_bring(install, mo
 def test_the_checks_of_a_package_load_its_extensions(install, text, state):
     install("parts", text, "midpoint", "dap3d.integrators")
     registry = dap.load_registry()
-    (source,) = [s for s in active_sources(registry) if s.distribution == "parts"]
-    report = check_named(registry, source.kind, source.keyword)
+    (source,) = [s for s in packages.active_sources(registry) if s.distribution == "parts"]
+    report = packages.check_named(registry, source.kind, source.keyword)
     assert [outcome.state for outcome in report.outcomes] == [state]

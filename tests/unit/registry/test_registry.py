@@ -10,10 +10,11 @@ import time
 from pathlib import Path
 
 import pytest
+from support.internals import discovery
 
 import dap3d_core as dap
 from dap3d_core.interface import PluginError
-from dap3d_core.registry import UnknownTypeError, discovery
+from dap3d_core.registry import UnknownTypeError
 
 GOOD = """
     from dap3d_core.interface import Body, Force, body, hookimpl, number

@@ -32,7 +32,6 @@ from support.results import (
 import dap3d_core as dap
 from dap3d_core.result import ResultError, RunMetadata, RunStatistics, open_result
 from dap3d_core.result import arrays as arrays_module
-from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.open import LazyArrays
 
 ABOUT = dict(
@@ -234,7 +233,7 @@ def both(tmp_path, monkeypatch, small_limits):
     monkeypatch.setattr(module, "FIRST_CHUNK", 1)
     whole = dap.simulate(problems.four_bar(), **SHORT)
     large = dap.simulate(problems.four_bar(), output=tmp_path / "run.nc", **SHORT)
-    assert isinstance(whole.arrays, Arrays)
+    assert isinstance(whole.arrays, arrays_module.Arrays)
     assert isinstance(large.arrays, LazyArrays)
     return whole, large
 

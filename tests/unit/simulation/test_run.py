@@ -12,7 +12,6 @@ import dap3d_core as dap
 from dap3d_core.integrators.moreau.contact_set import POINTS
 from dap3d_core.integrators.moreau.integration import MoreauIntegration
 from dap3d_core.simulation import run
-from dap3d_core.simulation.run import stepping_notes
 
 
 @pytest.mark.parametrize(
@@ -34,9 +33,9 @@ def ran(residual):
 
 
 def test_what_is_not_solved_is_a_warning():
-    (note,) = stepping_notes([ran(1e-2)], 1.0)
+    (note,) = run.stepping_notes([ran(1e-2)], 1.0)
     assert "shorter contact_step" in note
-    assert not stepping_notes([ran(1e-4)], 1.0)
+    assert not run.stepping_notes([ran(1e-4)], 1.0)
 
 
 def test_what_is_driven_into_another_is_a_warning():
@@ -64,4 +63,4 @@ def test_overlaps_are_parts_of_the_length_of_the_scene(length, words):
     )
     found = MoreauIntegration.overlapping.fget(one)
     assert (words in found, bool(found)) == (True, bool(words))
-    assert stepping_notes([SimpleNamespace(name="dop853")], 1.0) == []
+    assert run.stepping_notes([SimpleNamespace(name="dop853")], 1.0) == []

@@ -4,19 +4,12 @@ import random
 
 import numpy as np
 import pytest
-from support.internals import rotation as rotation_of_a_model
 from support.internals import sampled_types
 from support.plain import jit_is_on
 
 from dap3d_core.interface import examine
 from dap3d_core.testing import check_type, checks_for
-from dap3d_core.testing.samples.random_state import (
-    BODIES,
-    Direction,
-    quaternion_product,
-    random_state,
-    rotation,
-)
+from dap3d_core.testing.samples.random_state import BODIES, Direction, random_state
 from dap3d_forces.weight import Weight
 from dap3d_functions.polynomial import Polynomial
 from dap3d_joints.spherical import Spherical
@@ -25,14 +18,6 @@ from dap3d_joints.universal import Universal
 
 def some_state(seed=3):
     return random_state(random.Random(seed), [True, False], grounded=True)
-
-
-def test_rotations_are_those_of_the_model():
-    """And the product of quaternions is that of their rotations."""
-    p, q = some_state(1).p, some_state(2).p
-    assert rotation(p) == pytest.approx(rotation_of_a_model(p), abs=1e-15)
-    both = rotation_of_a_model(quaternion_product(p, q))
-    assert both == pytest.approx(rotation(p) @ rotation(q), abs=1e-15)
 
 
 def test_rates_are_those_of_finite_moves():
@@ -45,19 +30,6 @@ def test_rates_are_those_of_finite_moves():
     assert state.body_rate(along) == pytest.approx(rate, abs=1e-9)
     rate = (ahead.table() - back.table()) / 2e-5
     assert state.table_rate(along)[:, :3] == pytest.approx(rate[:, :3], abs=1e-8)
-
-
-def test_a_common_rigid_motion_keeps_distances_and_their_rates():
-    """Of all bodies, ground's included, whatever is set in motion with them."""
-    state, q = some_state(), some_state(5).p[1]
-    moved = state.together(q, np.ones(3), np.array([1.0, 2.0, 3.0]), np.array([0.3, -0.2, 0.5]))
-
-    def distance(s, h=0.0):
-        return np.linalg.norm((s.r[1] + h * s.v[1]) - (s.r[3] + h * s.v[3]))
-
-    assert distance(moved) == pytest.approx(distance(state), rel=1e-14)
-    rates = [(distance(s, 1e-6) - distance(s, -1e-6)) / 2e-6 for s in (state, moved)]
-    assert rates[0] == pytest.approx(rates[1], abs=1e-8)
 
 
 def test_samples_on_the_manifold():

@@ -4,10 +4,10 @@ import json
 import textwrap
 
 import pytest
+from support.internals import packages
 from support.plain import in_another_process
 
 import dap3d_core as dap
-from dap3d_core.testing import packages
 
 pytestmark = in_another_process
 

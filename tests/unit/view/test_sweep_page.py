@@ -9,7 +9,6 @@ from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.view import sweep_page
-from dap3d_core.view.sweep_page import SweepPoints
 
 #: Rest length and start of the spring below, m.
 LENGTH, START = 1.0, 1.25
@@ -114,11 +113,11 @@ def test_of_many_points_some_are_shown_and_the_page_says_so(monkeypatch):
 
 
 def test_points_of_a_grid_are_chosen_along_each_axis(grid):
-    few = SweepPoints.of(grid, 4)
+    few = sweep_page.SweepPoints.of(grid, 4)
     assert few.shape == (2, 2)
     assert few.data[K].values.tolist() == [4.0, 16.0]
     assert few.total == 6
-    cut = SweepPoints.of(grid.isel({MASS: 1}), 50)
+    cut = sweep_page.SweepPoints.of(grid.isel({MASS: 1}), 50)
     assert cut.axes == [K]
     assert len(dap.view(grid.isel({MASS: 1})).data["sweep"]["points"]) == 3
 

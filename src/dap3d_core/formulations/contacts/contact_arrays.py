@@ -85,6 +85,7 @@ class ContactArrays(Arrays):
     culprit = _integer()  # a contact with which no motion goes on
     round_count = _integer()  # of those kept
     exchanged = _real()  # J, sum of the magnitudes of work
+    taken_work = _real()  # J, of joints and drivers that velocities have been brought onto
 
     cone: Cone
     says: ContactOutputs
@@ -242,7 +243,7 @@ def contact_arrays(
         **arrays,
         cone=cone_of(m),
         integer=np.zeros(len(ContactArrays.indices("integer")), dtype=np.int64),
-        real=np.zeros(1),
+        real=np.zeros(len(ContactArrays.indices("real"))),
         placed=np.zeros_like(given["y"]),
         moves=np.zeros((n, size)),
         rows=np.zeros(n, dtype=np.int64),

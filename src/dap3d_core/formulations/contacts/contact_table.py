@@ -162,6 +162,15 @@ class ContactTable:
         return slice(0 if self.gapless[c] else 1, 3)
 
 
+def words_of_drive(name: str, mu: float) -> str:
+    """That friction of a contact is negative, or no number."""
+    return (
+        f"{name} would drive: its coefficient of friction, or length of what resists rolling or "
+        f"spinning, is {mu:.6g} there, and such laws (grip, resist) return finite numbers that are "
+        "not negative; change its numbers, or the law"
+    )
+
+
 @compiled
 def call_tension(
     t: float, k: int, o: ContactOutputs, minus_lambda: Floats, system: System, tensions: Any

@@ -9,9 +9,8 @@ coordinates.
 
 from typing import Any
 
-from dap3d_core.assembly.arrays import System, velocity_offset
+from dap3d_core.assembly.arrays import System
 from dap3d_core.assembly.evaluate import place, place_states
-from dap3d_core.assembly.metric import in_body_axes
 from dap3d_core.formulations import REPORT
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.contacts.contact_table import (
@@ -25,6 +24,7 @@ from dap3d_core.formulations.contacts.contact_table import (
 from dap3d_core.formulations.contacts.forces import put_slip_against, size_across
 from dap3d_core.formulations.contacts.impacts import AT_REST, collide, repeat_rounds, unjam
 from dap3d_core.formulations.contacts.loads import find_modes
+from dap3d_core.formulations.contacts.modes import is_pressed
 from dap3d_core.formulations.contacts.rows import (
     add_scaled,
     change,
@@ -33,6 +33,7 @@ from dap3d_core.formulations.contacts.rows import (
     put_feels,
     put_free,
     put_rows,
+    put_velocity,
     unscale,
 )
 from dap3d_core.formulations.switches import POSITION_ROUNDING
@@ -48,8 +49,8 @@ DEAD = 1e-12
 #: Part of the longest column below which slips that are stopped depend on each other.
 DEPENDENT = 1e-12
 #: What was decided, or why nothing is: joints prescribe that a contact closes, friction jams,
-#: bodies overlap at the start.
-DECIDED, PRESCRIBED, JAMMED, OVERLAPS = 0, 1, 2, 3
+#: bodies overlap at the start, friction would drive.
+DECIDED, PRESCRIBED, JAMMED, OVERLAPS, DRIVES = 0, 1, 2, 3, 4
 #: Places of a mode, the direction of sliding and the share among the states of elements.
 MODE, WAY, NEAR = 0, 1, 4
 
@@ -77,6 +78,8 @@ def decide(
         return OVERLAPS
     put_rows(t, s, system, loops)
     put_in_touch(s)
+    if find_drive(s):
+        return DRIVES
     take_ended(s)
     stop(s, system)
     if not leave_movable(t, s, system, loops, functions):
@@ -125,6 +128,9 @@ def repeat(t: float, s: ContactArrays, system: System, loops: Any, tensions: Any
     put_rows(t, s, system, loops)
     stop(s, system)
     repeat_rounds(s, system)
+    for c in range(s.mode.shape[0]):  # what sticks from here on slips no more, soon
+        s.was[c], s.stops[c] = s.mode[c], s.mode[c] == 2.0
+    stop(s, system)
     for c in range(s.mode.shape[0]):
         s.role[c], s.values[c] = s.mode[c] > 0.5, s.closing[c]
     lift(s)
@@ -156,6 +162,17 @@ def find_overlap(s: ContactArrays) -> bool:
     """True if the bodies of a contact overlap, which is ``culprit``."""
     for c in range(s.state.shape[0]):
         if s.says.found[c, REACH] >= 0.0 and s.says.found[c, GAP] < -s.limit[c]:
+            s.culprit = c
+            return True
+    return False
+
+
+@compiled
+def find_drive(s: ContactArrays) -> bool:
+    """True if friction of a contact in touch, ``culprit``, is negative or no number."""
+    for k in range(s.in_touch_count):
+        c = s.in_touch[k]
+        if not min(s.mu[c], s.mu_s[c]) >= 0.0 and is_pressed(s, c, s.in_touch, s.in_touch_count):
             s.culprit = c
             return True
     return False
@@ -335,16 +352,12 @@ def put_roles(s: ContactArrays) -> None:
 @compiled
 def put_state(s: ContactArrays, system: System) -> None:
     """The state ``y`` from the instant on."""
-    y, n, work = s.y, system.body.shape[0] - 1, 0.0
-    for b in range(1, n + 1):
-        o, f, q = 6 * b - 6, velocity_offset(b, n), 7 * b - 7
+    y, work = s.y, 0.0
+    for b in range(1, system.body.shape[0]):
+        o, q = 6 * b - 6, 7 * b - 7
+        put_velocity(b, s, system)
         for k in range(3):
-            y[f + k] += s.v[o + k] - s.v_before[o + k]
             y[q + k] += s.moved[o + k]
-        w = in_body_axes(system.body[b], s.v[o + 3] - s.v_before[o + 3],
-                         s.v[o + 4] - s.v_before[o + 4],
-                         s.v[o + 5] - s.v_before[o + 5])  # fmt: skip
-        y[f + 3], y[f + 4], y[f + 5] = y[f + 3] + w[0], y[f + 4] + w[1], y[f + 5] + w[2]
         turn, e0, e1, e2, e3 = s.moved[o + 3 : o + 6], y[q + 3], y[q + 4], y[q + 5], y[q + 6]
         y[q + 3] -= 0.5 * (turn[0] * e1 + turn[1] * e2 + turn[2] * e3)
         y[q + 4] += 0.5 * (e0 * turn[0] + turn[1] * e3 - turn[2] * e2)

@@ -20,6 +20,7 @@ from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.contacts.equations import BODY_I, BODY_J
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.runtime.loop_support import JP, MASS
 from dap3d_core.linear.least_squares import factor_least, solve_least
 
 #: Part of the longest column of A below which rows of joints depend on each other.
@@ -304,10 +305,59 @@ def lift(s: ContactArrays) -> None:
 
 
 @compiled
-def follow_joints(
-    s: ContactArrays, given: Floats, moves: Floats, A: Floats, system: System
-) -> bool:
-    """Bring velocities onto the joints, by impulses in them, and rows to what they are given.
+def follow_joints(t: float, s: ContactArrays, system: System, loops: Any) -> None:
+    """Rows at the state ``y``, and velocities there onto the joints, by impulses in them."""
+    place(t, s.y, system, loops)
+    put_rows(t, s, system, loops)
+    for r in range(s.lam_free.shape[0]):
+        rest = system.nu[system.row[r]]
+        for k in range(s.v.shape[0]):
+            rest -= s.J[r, k] * s.v[k]
+        add_scaled(s.unit[r] * rest, s.answers[r], s.push)
+    change(s, system)
+
+
+@compiled
+def follow_drivers(t: float, s: ContactArrays, system: System, loops: Any) -> None:
+    """Make velocities of the state ``y`` those that joints and drivers ask for."""
+    follow_joints(t, s, system, loops)
+    keep_velocities(s, system)
+
+
+@compiled
+def keep_velocities(s: ContactArrays, system: System) -> None:
+    """Make present velocities those of the state ``y``; what that takes is work, ``taken_work``."""
+    s.taken_work = 0.0
+    for b in range(1, system.body.shape[0]):
+        s.taken_work += put_velocity(b, s, system)
+        for k in range(6 * b - 6, 6 * b):
+            s.moved[k] = 0.0
+    s.y[s.y.shape[0] - 1] += s.taken_work
+
+
+@compiled
+def put_velocity(b: int, s: ContactArrays, system: System) -> float:
+    """Change the velocity of a body in the state ``y`` as that of now; kinetic energy it takes."""
+    y, x, o, f = s.y, system.body[b], 6 * b - 6, velocity_offset(b, system.body.shape[0] - 1)
+    turning, energy = s.direction, 0.0
+    turning[0], turning[1], turning[2] = in_body_axes(x, s.v[o + 3] - s.v_before[o + 3],
+                                                      s.v[o + 4] - s.v_before[o + 4],
+                                                      s.v[o + 5] - s.v_before[o + 5])  # fmt: skip
+    for k in range(3):
+        dv = s.v[o + k] - s.v_before[o + k]
+        energy += x[MASS] * dv * (y[f + k] + 0.5 * dv)
+        for i in range(3):
+            mean = y[f + 3 + i] + 0.5 * turning[i]
+            energy += turning[k] * x[JP + 3 * k + i] * mean
+        y[f + k] += dv
+    for k in range(3):
+        y[f + 3 + k] += turning[k]
+    return energy
+
+
+@compiled
+def meet(s: ContactArrays, given: Floats, moves: Floats, A: Floats, system: System) -> bool:
+    """Bring rows to what they are given, with velocities that joints allow.
 
     Args:
         s: with rows that are put.
@@ -321,13 +371,7 @@ def follow_joints(
     n, m = s.v.shape[0], given.shape[0]
     for q in range(m):
         for k in range(n):
-            given[q, n] += given[q, k] * s.v[k]
-    for r in range(s.lam_free.shape[0]):
-        rest = system.nu[system.row[r]]
-        for k in range(n):
-            rest -= s.J[r, k] * s.v[k]
-        add_scaled(s.unit[r] * rest, s.answers[r], s.push)
-    change(s, system)
+            given[q, n] += given[q, k] * s.v_before[k]
     for q in range(m):
         A[q, m] = put_held(s, given[q], moves[q], system)
     for q in range(m):

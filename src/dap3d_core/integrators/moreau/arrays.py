@@ -87,6 +87,7 @@ class StepArrays(Arrays):
     touch_count = _integer()  # the first ones, of shapes
     law_count = _integer()  # with those declared; behind them what resists their rolling
     stage = _integer()  # of a step that waits for room: 0, or FREE or MOVED (step.py)
+    driving = _integer()  # a declared contact whose friction was found to be negative
     is_solved = _integer()  # 1: there were contacts in the last step
     met_count = _integer()
     log_count = _integer()

@@ -301,18 +301,21 @@ def evaluate_rows(t: float, y: Floats, s: StepArrays, system: System, loops: Any
 
 
 @compiled
-def find_grips(t: float, s: StepArrays, system: System, loops: Any) -> None:
+def find_grips(t: float, s: StepArrays, system: System, loops: Any) -> bool:
     """Find coefficients of contacts whose law of friction is their own, at slip of ``before``.
+
+    False if one, ``driving``, has none that is a number and not negative.
 
     They are the friction that a normal force of one has at a slip along either tangent. Of what
     resists rolling it is a length, by which rows are multiplied: as of ``put_turning``.
     """
     for c in range(s.touch_count, s.law_count):
-        k = s.key[c] - DECLARED
+        k, least = s.key[c] - DECLARED, 0.0
         if s.under[c] >= 0:
             s.grip[k] = friction_at(t, s, c, 1, 0.0, system, loops)
             for i in range(12, 36):
                 s.J[c, i] *= s.grip[k]
+            least = s.grip[k]
         elif s.declared_law[k] != 0:
             _, u1, u2 = velocity_of(s, c, s.before)
             speed = math.sqrt(u1 * u1 + u2 * u2)
@@ -323,6 +326,11 @@ def find_grips(t: float, s: StepArrays, system: System, loops: Any) -> None:
             s.declared_mu[k], s.declared_mu_s[k] = slides, sticks
             s.declared_ratio[k] = max(across / slides, THIN) if slides > 0.0 else 1.0
             s.declared_ratio_s[k] = max(held / sticks, THIN) if sticks > 0.0 else 1.0
+            least = s.grip[k] = min(slides, sticks)
+        if not least >= 0.0:
+            s.driving = k
+            return False
+    return True
 
 
 @compiled

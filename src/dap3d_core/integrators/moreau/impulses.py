@@ -119,7 +119,13 @@ def remember(work: Any, s: StepArrays) -> None:
                     total += s.x[c, r] * s.J[c, 12 * r + k]
                 memory[count, 1 + k] = total if s.kind[c] == CONE else s.x[c, k]
             count += 1
-    for k in range(count, memory.shape[0]):
+    forget(memory, count)
+
+
+@compiled
+def forget(memory: Floats, first: int) -> None:
+    """Keep no impulses from row ``first`` on."""
+    for k in range(first, memory.shape[0]):
         for i in range(memory.shape[1]):
             memory[k, i] = -1.0
 
@@ -163,7 +169,7 @@ def keep_for_reports(s: StepArrays) -> None:
 
 
 @compiled
-def complete_row(work: Any, s: StepArrays, row: Floats) -> None:
+def put_means(work: Any, s: StepArrays, row: Floats) -> None:
     """Put means of the last step, at the start of the first one, into a row of reports."""
     if work.step_count == 0 and s.is_solved == 0:
         return

@@ -17,13 +17,13 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
+from dap3d_core.formulations.contacts.contact_table import words_of_drive
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators.moreau.arrays import all_room, grown
 from dap3d_core.integrators.moreau.contact_set import POINTS
 from dap3d_core.integrators.moreau.free_motion import MOST_PARTS, PART
-from dap3d_core.integrators.moreau.impulses import complete_row
 from dap3d_core.integrators.moreau.problem import arrays_of
-from dap3d_core.integrators.moreau.step import FOLLOWED, MOST_STEPS, advance
+from dap3d_core.integrators.moreau.step import FOLLOWED, MOST_STEPS, advance, complete_row
 from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.integration_state import (
     OTHER,
@@ -137,7 +137,8 @@ class MoreauIntegration(Integration):
 
     def complete(self, row: Floats) -> None:
         """As ``Integration.complete``: accelerations and forces are means of the last step."""
-        self.call(complete_row, self.work, self._arrays, row)
+        while not self.call(complete_row, *self.loop_arguments, row):
+            self._arrays = grown(self._arrays)
 
     @property
     def contact_rows(self) -> Floats:  # type: ignore[override]
@@ -174,6 +175,12 @@ class MoreauIntegration(Integration):
             f"{PART * MOST_PARTS / h:.2g} 1/s; let a joint do what so stiff a spring or damper "
             "does, give a shorter contact_step, or make it less stiff"
         )
+
+    @property
+    def driving(self) -> str:
+        """As of ``Integration``."""
+        s, names = self._arrays, self._evaluator.model.contact_names
+        return f"contact {words_of_drive(names[s.driving], s.grip[s.driving])}"
 
     @property
     def shortened(self) -> str:

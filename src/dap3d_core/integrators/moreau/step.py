@@ -24,11 +24,12 @@ from dap3d_core.integrators.moreau.free_motion import (
     normalise,
 )
 from dap3d_core.integrators.moreau.impulses import (
-    complete_row,
+    forget,
     keep_for_reports,
     let_slip,
     log_contacts,
     order_memory,
+    put_means,
     recall,
     remember,
     slot_of,
@@ -38,11 +39,13 @@ from dap3d_core.integrators.moreau.newton import product_of, speed_of
 from dap3d_core.integrators.moreau.problem import NEAR, prepare_problem, solve
 from dap3d_core.integrators.moreau.restitution import OVERLAP, limit_bounces, put_bias
 from dap3d_core.integrators.stepping.integration_state import (
+    DRIVEN,
     NO_ROOM,
     NOT_FINITE,
     OTHER,
     RUNNING,
     TRIAL,
+    Function,
     Y,
 )
 from dap3d_core.integrators.stepping.output import may_step, project_state
@@ -68,8 +71,8 @@ RENEWED, FOLLOWED, MOST_STEPS = 3, 2.0, 100
 #: Margin of contacts, as parts of the way of a step, and m of a scene of ordinary size.
 MARGIN, LEAST_MARGIN = 1.2, 1e-6
 #: Stages of a step that waits for room: the trial state is that without contacts; it is that where
-#: bodies have moved to, but may overlap.
-FREE, MOVED = 1, 2
+#: bodies have moved to, but may overlap; forces at the start are yet to be found.
+FREE, MOVED, START = 1, 2, 3
 
 
 @compiled
@@ -81,20 +84,21 @@ def advance(
     Or room is missing: ``stage`` says so.
     """
     limit = work.rhs_count + budget
+    starts = work.next_report == 0 and work.status == RUNNING and s.stage in (0, START)
+    if starts and s.is_exported == 0:
+        s.stage = 0 if push_at_start(work, s, functions[0], system, loops) else START
+        if s.stage == START:
+            return
     while s.stage != 0 or goes_on(work, s, functions, system, loops, limit):
         if s.stage == 0:
-            if work.step_count % RENEWED == 0:
-                work.rate = largest_rate(work, s, functions[0], system, loops)
-            s.t1 = next_end(work)
-            s.h = s.t1 - work.t
-            move_freely(work, s, functions[0], system, loops)
+            fly(work, s, functions[0], system, loops)
             s.stage = FREE
             if not all_finite(work.state[TRIAL]):
                 work.t_stop, work.status, s.stage = s.t1, NOT_FINITE, 0
                 return
         if s.stage == FREE:
             if not meet(work, s, system, loops):
-                break
+                break  # with a status, or for room
             if s.is_solved != 0:
                 carry_on(work, s)
             s.stage = MOVED
@@ -104,6 +108,48 @@ def advance(
         finish(work, s, functions, system, loops)
     if s.stage != 0 and s.is_exported != 0:
         work.t_stop, work.status, s.stage = s.t1, NO_ROOM, 0
+
+
+@compiled
+def push_at_start(work: Any, s: StepArrays, rhs: Function, system: System, loops: Any) -> bool:
+    """Find what contacts push with in the first step, for reports at the start; False without room.
+
+    The step is not taken, and begins later as if nothing had been found.
+    """
+    count, row = work.rhs_count, work.next_report
+    work.next_report, work.step_limit = 1, math.inf
+    fly(work, s, rhs, system, loops)
+    has_room = not all_finite(work.state[TRIAL]) or meet(work, s, system, loops)
+    work.rhs_count, work.next_report = count, row
+    work.segment_step_count, work.largest_residual = 0, 0.0
+    return has_room
+
+
+@compiled
+def fly(work: Any, s: StepArrays, rhs: Function, system: System, loops: Any) -> None:
+    """Take a step without contacts, as the trial state; the first one remembers nothing."""
+    if work.step_count == 0:
+        work.rate = work.last_rate = 0.0
+        for array in (work.direction, work.pulls):
+            for k in range(array.size):
+                array[k] = 0.0
+        forget(work.memory, 0)
+    if work.step_count % RENEWED == 0:
+        work.rate = largest_rate(work, s, rhs, system, loops)
+    s.t1 = next_end(work)
+    s.h = s.t1 - work.t
+    move_freely(work, s, rhs, system, loops)
+
+
+@compiled
+def complete_row(
+    work: Any, s: StepArrays, functions: Any, system: System, loops: Any, row: Floats
+) -> bool:
+    """Put means of the last step, at the start of the first one, into a row; False without room."""
+    if work.step_count == 0 and not push_at_start(work, s, functions[0], system, loops):
+        return False
+    put_means(work, s, row)
+    return True
 
 
 @compiled
@@ -129,7 +175,7 @@ def goes_on(
     first = work.row_count
     again = may_step(work, state_at, limit, functions[1], functions[2], system, loops)
     for q in range(first, work.row_count):
-        complete_row(work, s, work.rows[q])
+        put_means(work, s, work.rows[q])
         if s.is_exported == 0:
             log_contacts(work, s, work.rows[q, 0])
     return again
@@ -168,8 +214,9 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     if s.declared_gap.size == 0 and s.y.size > 0:
         evaluate_rows(work.t, y, s, system, loops)
     any_collides = put_bias(s)
-    if s.declared_law.size > 0:
-        find_grips(work.t, s, system, loops)
+    if s.declared_law.size > 0 and not find_grips(work.t, s, system, loops):
+        work.t_stop, work.status, s.stage = work.t, DRIVEN, 0
+        return False
     order_memory(work.memory, s.slots)
     if stay_closed(work, s) and not turn_rows(
         work.t + 0.5 * s.h, put_middle(work, s), s, system, loops

@@ -5,6 +5,7 @@ from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, MOST, NO
 from dap3d_core.integrators.stepping.step_control import EPSILON
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.scalar_math import slope, slope_count
 
 #: An iteration that converges slower than this does not.
 SLOWEST = 0.99
@@ -17,6 +18,8 @@ RATELESS = 1e3
 #: Changes up to this many limits may be rounding where the iteration stagnates, if they are up
 #: to this many roundings: near a singular pose a state is known to one over its distance squared.
 STALLED, MOST_ROUNDINGS = 10.0, 1e6
+#: Passes at most for derivatives of stages, and how much a pass must bring them on to be worth it.
+MOST_OF_SLOPES, WORTH = 40, 0.5
 
 
 @compiled
@@ -98,3 +101,23 @@ def is_settling(multipliers: float, work: RadauState) -> bool:
     Behind a singular pose they change by much where the motion hardly does.
     """
     return work.regularisation != 0.0 and work.multiplier_change < SETTLING * multipliers
+
+
+@compiled
+def change_of_slopes(work: RadauState) -> float:
+    """The last change of the derivatives of the stages, as a part of the largest of their group."""
+    y, worst = work.state[Y], 0.0
+    for d in range(slope_count()):
+        first = 0
+        for group in range(3):
+            last = min(first + work.counts[group], work.error_size)
+            size = change = 0.0
+            for k in range(first, last):
+                size = max(size, abs(slope(y[k], d)))
+                for i in range(work.stages):
+                    size = max(size, abs(slope(work.Z[i, k], d)))
+                    change = max(change, abs(slope(work.R[i, k], d)))
+            if not change <= worst * size:
+                worst = change / size
+            first = last
+    return worst

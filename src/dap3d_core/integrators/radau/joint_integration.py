@@ -21,6 +21,7 @@ from dap3d_core.integrators.radau.error import filter_error, sum_work
 from dap3d_core.integrators.radau.integration import RadauIntegration
 from dap3d_core.integrators.radau.newton import (
     UNFOUND,
+    find_slopes,
     iterate_stages,
     method_index,
     pair_count,
@@ -36,6 +37,7 @@ from dap3d_core.integrators.stepping.rounding import ROUNDINGS, SAMPLES, change_
 from dap3d_core.kernels.compiler.types import Table
 from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, MATRIX, Arrays
 from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.scalar_math import is_differentiated
 from dap3d_core.linear.lu import StateNode, factor_lu, make_lu_plan, solve_lu
 
 #: Step of a difference, as part of a component's size: short against the depth of stiff contact
@@ -218,8 +220,11 @@ def find_rate_stages(
     functions: Any,
 ) -> float:  # fmt: skip
     """As ``find_stages``."""
-    return iterate_stages(t, h, work, system, loops, tangent, functions, evaluate_rates,
-                          solve_rates, change_rates)  # fmt: skip
+    shorter = iterate_stages(t, h, work, system, loops, tangent, functions, evaluate_rates,
+                             solve_rates, change_rates)  # fmt: skip
+    if shorter == 0.0 and is_differentiated():
+        find_slopes(t, h, work, system, loops, tangent, functions, evaluate_rates, solve_rates)
+    return shorter
 
 
 @compiled

@@ -29,7 +29,10 @@ from dap3d_core.formulations.stabilized_index2.stage_equations import (
 )
 from dap3d_core.formulations.stabilized_index2.state_tangent import differentiate_states
 from dap3d_core.integrators.radau.convergence import (
+    MOST_OF_SLOPES,
     SLOWEST,
+    WORTH,
+    change_of_slopes,
     converges,
     is_at_rounding,
     is_exact,
@@ -41,6 +44,7 @@ from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.radau.tableau import FEWEST
 from dap3d_core.integrators.stepping.integration_state import SCRATCH, Y
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
+from dap3d_core.kernels.scalar_math import is_differentiated, with_slopes
 from dap3d_core.linear.lu import factor_lu, solve_lu
 
 EPSILON = 2.220446049250313e-16
@@ -337,8 +341,40 @@ def find_stages(
     matrix: StageMatrix,
 ) -> float:  # fmt: skip
     """``iterate_stages`` on the equations of bodies."""
-    return iterate_stages(t, h, work, system, loops, tangent, matrix, evaluate_stages, solve_stages,
-                          change_stages)  # fmt: skip
+    shorter = iterate_stages(t, h, work, system, loops, tangent, matrix, evaluate_stages,
+                             solve_stages, change_stages)  # fmt: skip
+    if shorter == 0.0 and is_differentiated():
+        find_slopes(t, h, work, system, loops, tangent, matrix, evaluate_stages, solve_stages)
+    return shorter
+
+
+@compiled_into
+def find_slopes(
+    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: Any, matrix: Any,
+    evaluate: Any, solve: Any,
+) -> None:  # fmt: skip
+    """Derivatives of the stages, whose values are found: the iteration goes on for them alone.
+
+    evaluate, solve: as of ``iterate_stages``. It stopped by values, which may be right from the
+    start, as of a uniform motion; derivatives follow at the rate of the tangent, which lacks what
+    sliding does to the force that it depends on.
+    """
+    Z, R, found, changes = work.Z, work.R, work.multipliers, work.G
+    before = LARGEST
+    for done in range(MOST_OF_SLOPES):
+        evaluate(t, h, work, system, loops, tangent, matrix)
+        solve(h, work, system, tangent, matrix)
+        work.rhs_count -= work.stages
+        change = change_of_slopes(work)
+        for i in range(work.stages):
+            for k in range(Z.shape[1]):
+                Z[i, k] = with_slopes(Z[i, k], Z[i, k] + R[i, k])
+            for r in range(2):
+                for k in range(found.shape[2]):
+                    found[i, r, k] = with_slopes(found[i, r, k], found[i, r, k] + changes[i, r, k])
+        if change <= work.newton_limit * work.rtol or (done > 0 and not change < WORTH * before):
+            return
+        before = change
 
 
 @compiled_into

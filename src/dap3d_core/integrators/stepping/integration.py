@@ -357,6 +357,11 @@ class Integration(Restorable):
         return ""
 
     @property
+    def driving(self) -> str:
+        """A contact whose friction would drive, in words; or ""."""
+        return ""
+
+    @property
     def dy_dt(self) -> Floats | None:
         """(n,) dy/dt at ``t``, a copy; None where it is not known."""
         if self.work.first_stage_valid == 0:

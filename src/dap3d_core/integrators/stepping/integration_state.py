@@ -30,6 +30,7 @@ class Status(IntEnum):
     JUMPED = 9  # velocities or states jump here; who advances it changes them and goes on
     STALLED = 10  # steps are so short that the run would not end
     NO_ROOM = 11  # more contacts than an exported model has room for
+    DRIVEN = 12  # friction of a contact is negative, or no number
 
 
 # The same as plain integers, for compiled code.
@@ -37,7 +38,7 @@ RUNNING, FINISHED = int(Status.RUNNING), int(Status.FINISHED)
 STEP_FLOOR, NOT_FINITE = int(Status.STEP_FLOOR), int(Status.NOT_FINITE)
 PROJECTION_FAILED, SWITCHED = int(Status.PROJECTION_FAILED), int(Status.SWITCHED)
 CHATTERED, STIFF, JUMPED = int(Status.CHATTERED), int(Status.STIFF), int(Status.JUMPED)
-STALLED, NO_ROOM = int(Status.STALLED), int(Status.NO_ROOM)
+STALLED, NO_ROOM, DRIVEN = int(Status.STALLED), int(Status.NO_ROOM), int(Status.DRIVEN)
 
 # Rows of ``state``: y at t; the state that a step tries to reach, or an interpolated one; scratch;
 # the projected trial state, where it is known before (runge_kutta/lanes.py).

@@ -236,6 +236,12 @@ def switch(axes, u, ahead, toward, lam, load, mu, mu_s, mode, near):
     return 1.0, where(held(mode), sticks, where(closed(mode), slides, 1.0))
 
 
+def resisting_switch(axes, u, ahead, toward, lam, load, mu, mu_s, mode, near):
+    """The same, or a length that becomes negative."""
+    _, ends = switch(axes, u, ahead, toward, lam, load, mu, mu_s, mode, near)
+    return 1.0, where(closed(mode) & (mu < 0.0), mu, ends)
+
+
 def output(axes, u, ahead, c, lam, load, mu, mode, near):
     """As that of rows.py; the normal force is the load."""
     T = whole(axes, ahead, lam, load, mu, mode, near)
@@ -258,7 +264,7 @@ KERNELS = {"J": blocks, "gamma": gamma, "friction": friction, "switch": switch,
 OF_ONE = KERNELS | {"J": block, "friction": friction_of_one}
 TURNING = {"J": turning_blocks, "gamma": turning_gamma, "rate": rate, "friction": turning_friction,
            "switch": switch, "tension": turning_output}  # fmt: skip
-RESISTING = TURNING | {"tension": resisting_output}
+RESISTING = TURNING | {"switch": resisting_switch, "tension": resisting_output}
 RESISTING_ON_ONE = RESISTING | {"J": turning_block, "friction": turning_friction_of_one}
 
 

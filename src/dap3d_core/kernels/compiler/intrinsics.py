@@ -10,9 +10,10 @@ import numpy as np
 
 from dap3d_core.kernels.compiler import types as t
 from dap3d_core.kernels.compiler.writer import (
-    DIFFERENTIATED,
+    COUNT,
     EXACT,
     LIBRARY,
+    SLOPE,
     SLOPES,
     VALUES,
     Writer,
@@ -103,8 +104,18 @@ def _values_alone(w: Writer, node: ast.Call, values: list[t.Value]) -> t.Value:
     return w.emit(t.BOOL, f"and i1 false, false {VALUES}")
 
 
+def _slope(w: Writer, node: ast.Call, values: list[t.Value]) -> t.Value:
+    x, k = (w.cast(node, value, kind).word for value, kind in zip(values, (t.FLOAT, t.INT)))
+    zero = t.constant(0.0).word
+    return w.emit(t.FLOAT, f"select i1 true, double {zero}, double {x} {SLOPE} {k}")
+
+
+def _slope_count(w: Writer, node: ast.Call, values: list[t.Value]) -> t.Value:
+    return w.emit(t.INT, f"add i64 0, 0 {COUNT}")
+
+
 def _is_differentiated(w: Writer, node: ast.Call, values: list[t.Value]) -> t.Value:
-    return w.emit(t.BOOL, f"and i1 false, false {DIFFERENTIATED}")
+    return w.comparison(node, ast.Gt(), _slope_count(w, node, values), t.constant(0))
 
 
 def _pointer(w: Writer, node: ast.Call, values: list[t.Value]) -> t.Value:
@@ -118,6 +129,7 @@ FORMS: dict[str, Form] = {
     "int": _conversion(t.INT), "float": _conversion(t.FLOAT), "bool": _conversion(t.BOOL),
     "complex": _complex, "integer ceil": _ceil, "abs": _abs, "sign": _sign,
     "min": _extreme(ast.Lt()), "max": _extreme(ast.Gt()), "pointer": _pointer,
-    "where": _where, "with_slopes": _with_slopes, "is_differentiated": _is_differentiated,
+    "where": _where, "with_slopes": _with_slopes, "slope": _slope,
+    "slope_count": _slope_count, "is_differentiated": _is_differentiated,
     "values_alone": _values_alone,
 }  # fmt: skip

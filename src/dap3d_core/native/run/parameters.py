@@ -85,7 +85,8 @@ def places_of(
             "export a model for each value, or name a number that is used as it is",
         )
     moves_start = "start" in moved
-    if moves_start and not all(map(_is_assembled_alike, others)):
+    start = prepared.start
+    if moves_start and not (start and start.moves and all(map(_is_assembled_alike, others))):
         raise refusal(
             f"parameter {name} cannot be set in an exported model: the start depends on it, and "
             "compiled code does not correct it as Python does",

@@ -8,16 +8,18 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
+from dap3d_core.assembly.arrays import step_functions
 from dap3d_core.formulations.contacts.decide import decide
+from dap3d_core.formulations.contacts.rows import follow_drivers
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.jumps.law import JumpLaw
 from dap3d_core.formulations.jumps.rounds import jump
 from dap3d_core.integrators import IMPLICIT, Integration
 from dap3d_core.integrators.adams.integration import AdamsIntegration
 from dap3d_core.integrators.adams.step import advance_adams
-from dap3d_core.integrators.moreau.impulses import complete_row
 from dap3d_core.integrators.moreau.integration import MoreauIntegration
 from dap3d_core.integrators.moreau.step import advance as advance_contacts
+from dap3d_core.integrators.moreau.step import complete_row
 from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.integrators.radau.integration import RadauIntegration
 from dap3d_core.integrators.radau.step import advance as advance_radau
@@ -45,6 +47,7 @@ from dap3d_core.simulation.stepwise.stepped_run import HORIZON, OpenRun
 from dap3d_core.study.batch import initial_state
 from dap3d_core.study.batch.compiled_batch import UNIT_METRIC, begin_functions
 from dap3d_core.study.batch.driver import MIN_PIVOT
+from dap3d_core.study.batch.initial_state import begin_free
 
 #: Final time of an exported run where the scene has none, s.
 USUAL_END = 1.0
@@ -78,7 +81,7 @@ class Advance:
         integration: as it begins.
         entry: the loop.
         arguments: structs and tables that it takes before the budget.
-        completes: puts into a row what a report does not know; of the first two arguments.
+        completes: puts into a row what a report does not know; of the same arguments.
     """
 
     integration: Integration
@@ -101,8 +104,7 @@ class Advance:
         if isinstance(integration, MoreauIntegration):
             integration.make_room()
             more: Any = complete_row
-            structs = map(type_of, integration.loop_arguments[:2])
-            completes = more.compile([*structs, Array(FLOAT, 1)])
+            completes = more.compile([*map(type_of, integration.loop_arguments), Array(FLOAT, 1)])
         if isinstance(integration, RadauIntegration):
             function = advance_radau
         elif function is None:
@@ -155,15 +157,17 @@ class ContactCode:
 
     Attributes:
         entry, arguments: as of ``JumpCode``.
+        follows: brings velocities onto drivers, where these read inputs; of the first arguments.
         names: of the contacts.
     """
 
     entry: Entry
     arguments: tuple[Any, ...]
+    follows: Entry | None
     names: tuple[str, ...]
 
     @classmethod
-    def of(cls, evaluator: Evaluator) -> "ContactCode":
+    def of(cls, evaluator: Evaluator, *, drives: bool) -> "ContactCode":
         """That of a model.
 
         Raises:
@@ -179,8 +183,11 @@ class ContactCode:
         table, arrays = jumps.table, jumps.table.arrays()
         arrays.jammed = -1
         given = arrays, evaluator.system, evaluator.loops, evaluator.functions, table.tensions
-        function: Any = decide
-        return cls(function.compile([FLOAT, *map(type_of, given)]), given, tuple(table.names))
+        types = [FLOAT, *map(type_of, given)]
+        decides: Any = decide
+        follows: Any = follow_drivers
+        follow = follows.compile(types[:4]) if drives else None
+        return cls(decides.compile(types), given, follow, tuple(table.names))
 
 
 @attrs.define(eq=False, kw_only=True, slots=False)
@@ -200,20 +207,25 @@ class StartCode:
         arrays: what it works on.
         functions: those that store references of a start, and that assemble it.
         assembles: it is brought onto the constraints.
+        moves: another start may be given; False where Python alone brings it onto the constraints.
     """
 
     arrays: StartArrays
     functions: Any
     assembles: bool
+    moves: bool
     least_pivot: ClassVar[float] = MIN_PIVOT
 
     @classmethod
     def of(cls, evaluator: Evaluator, settings: Any) -> "StartCode | None":
         """That of a model; None where Python alone finds its start."""
         model, formulation = evaluator.model, evaluator.formulation
-        if formulation.has_own_coordinates or model.contact_count or evaluator.has_unknowns:
+        if formulation.has_own_coordinates or evaluator.has_unknowns:
             return None
-        if settings.start == "equilibrium" or settings.hold or model.iterated_forces:
+        has_contacts = bool(model.contact_count)
+        if settings.start == "equilibrium" or settings.hold:
+            return None
+        if model.iterated_forces and not has_contacts:  # those are found at each start anew
             return None
         if str(settings.correct_metric) != "unit":
             return None
@@ -225,10 +237,11 @@ class StartCode:
         starting[initial_state.STARTING + without] = 1.0
         given = np.concatenate([model.u0, model.initial_states])
         arrays = StartArrays(given=given, unit=unit, starting=starting)
-        assembles = bool(model.row_count and settings.correct)
-        if assembles and formulation.accepts_redundant:
-            return None
-        return cls(arrays, begin_functions(formulation), assembles)
+        is_corrected = bool(model.joint_row_count and settings.correct)
+        assembles = is_corrected and not (formulation.accepts_redundant or has_contacts)
+        # pivots beside contacts are not watched (formulations/pivots.py)
+        found = step_functions(begin_free) if has_contacts else begin_functions(formulation)
+        return cls(arrays, found, assembles, assembles or not is_corrected)
 
     @staticmethod
     def given_state(evaluator: Evaluator) -> Floats:
@@ -245,7 +258,6 @@ class PreparedRun:
         t_end: s, by default.
         advances: the integration that it begins with; for "auto" the implicit one as well.
         jumps: the law of jumps, or what contacts do at events; None where velocities do not jump.
-        start: how it starts; None where Python alone finds that.
     """
 
     def __init__(
@@ -289,8 +301,8 @@ class PreparedRun:
                 second.compile()
                 integrations.append(second)
         self.advances = [Advance.of(one) for one in integrations]
-        is_singular = run.singular is not None
-        self.start = None if is_singular else StartCode.of(self.evaluator, run.settings)
+        #: False where no parameter asks for another start: its code is left out.
+        self.may_start_anew = run.singular is None
         #: Arrays and tables besides: of outputs.
         self.more: list[Any] = []
 
@@ -303,6 +315,12 @@ class PreparedRun:
         parts += [] if self.start is None else [self.start.arrays, self.start.functions]
         return Image(self.evaluator.loops, *parts, *self.more)
 
+    @cached_property
+    def start(self) -> StartCode | None:
+        """How it starts; None where Python alone finds that, or nothing asks for it."""
+        settings = self.run.settings
+        return StartCode.of(self.evaluator, settings) if self.may_start_anew else None
+
     @property
     def steps_contacts(self) -> bool:
         """True if steps follow contacts: rates of states are no functions of them then."""
@@ -314,12 +332,7 @@ class PreparedRun:
             jumps_of(self.evaluator, self.run.settings)
             return
         if self.evaluator.model.contact_count:
-            if self.drives:  # velocities then jump with them
-                raise refusal(
-                    "inputs that drivers read, beside contacts that events follow",
-                    'let steps follow the contacts (contact = "stepping"), or export it without',
-                )
-            self.jumps = ContactCode.of(self.evaluator)
+            self.jumps = ContactCode.of(self.evaluator, drives=self.drives)
         elif any(s.jumps for s in self.evaluator.switches):
             self.jumps = JumpCode.of(self.evaluator)
 

@@ -6,6 +6,7 @@
    the same bits. */
 
 #define DAP3D_BUILD
+#include <float.h>
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -17,7 +18,7 @@
 enum { RHS, PROJECT, REPORT, ACCEPTED, WATCH };
 /* Status of an integration (integration_state.py). */
 enum { RUNNING, FINISHED, STEP_FLOOR, NOT_FINITE, PROJECTION_FAILED, SWITCHED, CHATTERED, ENDED,
-       STIFF, JUMPED, STALLED, NO_ROOM };
+       STIFF, JUMPED, STALLED, NO_ROOM, DRIVEN };
 #define HORIZON 1e5
 #define ALIKE 1e-9
 #define LARGEST 1e100
@@ -66,8 +67,16 @@ static double *y_of(dap3d_model *m) { return numbers(m, integrations[m->which].s
 
 static void call(dap3d_model *m, int k, double t, const double *y, double *out, int64_t size)
 {
-    function f = (function)(uintptr_t)m->w[FUNCTIONS + k];
+    function f = k == REPORT ? (function)REPORT_CODE : (function)(uintptr_t)m->w[FUNCTIONS + k];
     f(t, y, STATES, out, size, m->w + SYSTEM, m->w + LOOPS);
+}
+
+/* In place of a report, where integrations write rows: outputs have one where they are asked for. */
+static void leave_out(double t, const double *y, int64_t states, double *out, int64_t size,
+                      void *system, void *loops)
+{
+    (void)t, (void)y, (void)states, (void)system, (void)loops;
+    memset(out, 0, 8 * (size_t)size);
 }
 
 /* Fill in the addresses of a run's memory, which has moved. */
@@ -77,6 +86,8 @@ static void place(dap3d_model *m)
         m->w[addresses[k][0]] = (int64_t)(uintptr_t)(m->w + addresses[k][1]);
     for (size_t k = 0; k < sizeof codes / sizeof *codes; k++)
         m->w[codes[k].word] = (int64_t)(uintptr_t)codes[k].code;
+    if (!REPORTS)
+        m->w[FUNCTIONS + REPORT] = (int64_t)(uintptr_t)leave_out;
 }
 
 static int fail(dap3d_model *m, int result, const char *words)
@@ -200,6 +211,11 @@ static void report(dap3d_model *m)
 #if COMPLETES
     complete(m->w, m->row);
 #endif
+    for (int k = 0; k < ROW; k++)
+        if (!(fabs(m->row[k]) <= DBL_MAX)) { /* the next step says so */
+            integer_of(m)[I_status] = NOT_FINITE;
+            real_of(m)[R_t_stop] = m->t;
+        }
     call_elements(m);
     dap3d_outputs(numbers(m, BODIES), m->row + 1, numbers(m, VALUES),
                   numbers(m, VALUES_OF_ELEMENTS), m->outputs);
@@ -412,7 +428,7 @@ static int let_jump(dap3d_model *m, const double *crossing, const double *sides,
 #endif
 
 #if CONTACTS
-enum { PRESCRIBED = 1, JAMMED, OVERLAPS, ENDLESS, SLOWLY };
+enum { PRESCRIBED = 1, JAMMED, OVERLAPS, PUSHES, ENDLESS, SLOWLY };
 
 /* Let switches of contacts be on the side of what goes on. */
 static void go_on(dap3d_model *m, double *sides)
@@ -421,11 +437,20 @@ static void go_on(dap3d_model *m, double *sides)
         sides[m->w[CONTACT_SWITCHES + k]] = 1.0;
 }
 
+/* As ContactJumps._go_on: the state that was decided on becomes that of the run. */
+static void take_decided(dap3d_model *m)
+{
+    double rates[STATES];
+    memcpy(y_of(m), numbers(m, CONTACT_Y), 8 * STATES);
+    restart(m);
+    go_on(m, numbers(m, integrations[m->which].sides));
+    call(m, RHS, real_of(m)[R_t], y_of(m), rates, STATES);
+}
+
 /* As ContactJumps._resolve: what contacts do at the present state, where switches have crossed, if
    any; whether that went well. */
 static int let_touch(dap3d_model *m, const double *crossing, int starts)
 {
-    double *y = numbers(m, CONTACT_Y), rates[STATES], t = real_of(m)[R_t];
     for (int c = 0; c < CONTACTS; c++)
         numbers(m, CONTACT_LIMIT)[c] =
             (starts ? TOUCHING_AT_START : TOUCHING) * numbers(m, CONTACT_LENGTH)[c] /
@@ -433,14 +458,11 @@ static int let_touch(dap3d_model *m, const double *crossing, int starts)
     for (int k = 0; k < 2 * CONTACTS; k++)
         m->w[CONTACT_ENDED + k] = crossing != NULL && crossing[m->w[CONTACT_SWITCHES + k]] != 0.0;
     m->w[CONTACT_INTEGER + CI_starts] = starts;
-    memcpy(y, y_of(m), 8 * STATES);
-    m->failure = contact_law(t, m->w);
+    memcpy(numbers(m, CONTACT_Y), y_of(m), 8 * STATES);
+    m->failure = contact_law(real_of(m)[R_t], m->w);
     if (m->failure)
         return 0;
-    memcpy(y_of(m), y, 8 * STATES);
-    restart(m);
-    go_on(m, numbers(m, integrations[m->which].sides));
-    call(m, RHS, t, y_of(m), rates, STATES);
+    take_decided(m);
     return 1;
 }
 
@@ -479,7 +501,7 @@ static void say_failure(dap3d_model *m, double t)
     static const char *const words[] = {
         "", " closes, and joints or drivers prescribe the motion of its bodies",
         " jams: its friction presses the bodies together by more than it lets them give way",
-        ": its bodies overlap at the start", "s change ever faster",
+        ": its bodies overlap at the start", " would drive: its friction is negative", "s change ever faster",
         "s slip and turn by next to nothing, or rattle: slip jams again and again. Try smaller mu"};
     int has_name = m->failure < ENDLESS;
     const char *name = has_name ? contact_names[m->w[CONTACT_INTEGER + CI_culprit]] : "";
@@ -655,7 +677,7 @@ static int stopped(dap3d_model *m)
         "rates or a state are not finite", "no state on the constraints was found",
         "a switch of the model ended the run", "a switch changed its sign again and again", "",
         "the scene is stiff", "joints hold a velocity that is to jump", "steps are so short that the run would not end",
-        "more contacts came near than the model has room for"};
+        "more contacts came near than the model has room for", "friction of a contact is negative"};
     int64_t status = integer_of(m)[I_status];
     double t = status == FINISHED ? real_of(m)[R_t] : real_of(m)[R_t_stop];
     m->is_over = status == SWITCHED || status == FINISHED ? OVER : FAILED;
@@ -664,7 +686,7 @@ static int stopped(dap3d_model *m)
         return say_failure(m, t), DAP3D_ERROR;
 #endif
     snprintf(m->message, sizeof m->message, "the run stopped at t = %.9g s: %s", t,
-             words[status >= 0 && status <= NO_ROOM ? status : 0]);
+             words[status >= 0 && status <= DRIVEN ? status : 0]);
     return m->is_over == FAILED ? DAP3D_ERROR : DAP3D_ENDED;
 }
 
@@ -712,6 +734,7 @@ static int step_freely(dap3d_model *m, double t)
 
 /* ---------------------------------------------------------------------- holds of inputs */
 
+#if DRIVES && !CONTACTS
 static double kinetic_energy(dap3d_model *m)
 {
     double total = 0.0, report_of[ROW];
@@ -729,6 +752,8 @@ static double kinetic_energy(dap3d_model *m)
     return total;
 }
 
+#endif
+
 /* As Hold.jump and sampled.jump: inputs have changed. */
 static int jump(dap3d_model *m)
 {
@@ -743,12 +768,16 @@ static int jump(dap3d_model *m)
         if (integrations[m->which].keeps_step)
             real[R_h] = h;
     }
-    if (DRIVES) { /* velocities jump with a driver; what that takes is work */
-        double before = kinetic_energy(m);
-        if (!project(m))
-            return stopped(m);
-        y_of(m)[STATES - 1] += kinetic_energy(m) - before;
-    }
+#if DRIVES && CONTACTS /* as ContactJumps.set_state */
+    memcpy(numbers(m, CONTACT_Y), y_of(m), 8 * STATES);
+    follow_drivers(real[R_t], m->w);
+    take_decided(m);
+#elif DRIVES /* velocities jump with a driver; what that takes is work */
+    double before = kinetic_energy(m);
+    if (!project(m))
+        return stopped(m);
+    y_of(m)[STATES - 1] += kinetic_energy(m) - before;
+#endif
 #if CONTACTS
     if (!let_touch(m, NULL, 0)) { /* what touches lifts, slips or sticks by the forces that act then */
         integer[I_status] = JUMPED;

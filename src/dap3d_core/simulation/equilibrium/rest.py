@@ -119,7 +119,7 @@ def _hold_contacts(evaluator: Evaluator, u: Floats, where: str) -> None:
     Raises:
         SimulationError: bodies overlap, or a contact slips.
     """
-    from dap3d_core.formulations.contacts.contact_table import GAP, ContactTable
+    from dap3d_core.formulations.contacts.contact_table import GAP, ContactTable, words_of_drive
     from dap3d_core.formulations.contacts.decide import find_modes_at_rest
 
     table, still = ContactTable(evaluator), u.copy()
@@ -130,10 +130,14 @@ def _hold_contacts(evaluator: Evaluator, u: Floats, where: str) -> None:
     s.in_touch[: len(touching)], s.in_touch_count = touching, len(touching)
     given = evaluator.system, evaluator.loops, evaluator.functions, table.tensions
     if find_modes_at_rest(0.0, s, *given):
-        bad = [table.names[k] for k in np.flatnonzero((s.mode == 1.0) & (table.mu > 0.0))]
+        bad = [table.names[k] for k in np.flatnonzero((s.mode == 1.0) & (s.mu > 0.0))]
         slips = "slips"
     else:
         bad, slips = [table.names[k] for k in np.flatnonzero(s.jams)], "jams"
+    if (drives := np.flatnonzero(~(np.minimum(s.mu, s.mu_s) >= 0.0))).size:
+        c = int(drives[0])
+        words = words_of_drive(table.names[c], float(min(s.mu[c], s.mu_s[c]) * s.arm[c]))
+        raise SimulationError(f"{where} contact {words}")
     if over := [table.names[k] for k in np.flatnonzero(gaps < -limit)]:
         bad, slips = over, "overlaps"
     if bad:

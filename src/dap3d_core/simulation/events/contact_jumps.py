@@ -8,18 +8,29 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
-from dap3d_core.formulations.contacts.contact_table import GAP, REACH, SLIP, ContactTable
-from dap3d_core.formulations.contacts.decide import OVERLAPS, PRESCRIBED, decide, repeat
+from dap3d_core.formulations.contacts.contact_table import (
+    GAP,
+    REACH,
+    SLIP,
+    ContactTable,
+    words_of_drive,
+)
+from dap3d_core.formulations.contacts.decide import (
+    DRIVES,
+    OVERLAPS,
+    PRESCRIBED,
+    decide,
+    repeat,
+)
 from dap3d_core.formulations.contacts.impacts import ROUNDS
 from dap3d_core.formulations.contacts.modes import nearly_jams
-from dap3d_core.formulations.contacts.rows import follow_joints, put_rows
+from dap3d_core.formulations.contacts.rows import follow_joints, keep_velocities, meet, put_rows
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.interface.contacts.rows import APART
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.model.rotations import to_body
-from dap3d_core.model.state_layout import split, velocities_of
+from dap3d_core.model.state_layout import velocities_of
 from dap3d_core.result import EventRecord
 from dap3d_core.result.note import information
 from dap3d_core.scene import Mistake, SceneError
@@ -210,30 +221,22 @@ class ContactJumps(Jumps):
         Raises:
             SimulationError: the joints do not allow such velocities.
         """
-        evaluator, model, s = self._in_bodies, self._evaluator.model, self.arrays
-        u, own = self._state_of(integration), self._evaluator.states.copy()
-        self._put_rows(integration)
+        system, loops, s = self._in_bodies.system, self._in_bodies.loops, self.arrays
+        model, u = self._evaluator.model, self._place(integration)
+        follow_joints(float(integration.t), s, system, loops)
         rows = [np.append(row[6:], change) for row, change in rows_to(u, bodies)]
         given = np.array(rows).reshape(-1, 6 * model.body_count + 1)
         scratch = np.zeros((len(given), len(s.v))), np.zeros((len(given), len(given) + 1))
-        if not follow_joints(s, given, *scratch, evaluator.system):
+        if rows and not meet(s, given, *scratch, system):
             raise self._impossible(integration.t, title, bodies)
+        keep_velocities(s, system)
+        first_state = model.integrated_layout["states"].start
         for first, numbers in states.items():
-            own[first : first + len(numbers)] = numbers
-        after = self._after(u)
-        work = self._kinetic(after) - self._kinetic(u)
-        y = self._evaluator.coordinates.with_jump(integration.y, s.v - s.v_before, own, work)
-        self._go_on(integration, y, own)
+            s.y[first_state + first :][: len(numbers)] = numbers
+        after, work = self._after(u), s.taken_work
+        self._take(integration, work)
         self.settle(integration)
         return after, work
-
-    def _kinetic(self, u: Floats) -> float:
-        """Kinetic energy of a state u (13 n,), J."""
-        model = self._evaluator.model
-        _, p, v, w = split(u)
-        own = to_body(p, w)
-        turning = np.einsum("bi,bij,bj->", own, model.Jp, own)
-        return 0.5 * float(model.mass @ np.sum(v * v, axis=1) + turning)
 
     def settle(self, integration: Integration) -> None:
         """Find velocities and modes anew, where joints have ended or velocities were set."""
@@ -277,13 +280,13 @@ class ContactJumps(Jumps):
         given = t, s, evaluator.system, evaluator.loops
         if self.repeats:
             repeat(*given, table.tensions)
-            self._take_decided(integration)
+            self._take(integration, float(np.sum(s.work)))
             return
         if failure := decide(*given, evaluator.functions, table.tensions):
             self._refuse(t, failure)
         s.jammed = -1
         self.lose |= abs(float(np.sum(s.work))) > LOSSLESS * s.exchanged
-        self._take_decided(integration)
+        self._take(integration, float(np.sum(s.work)))
         after = self._after(u)
         for c in np.flatnonzero(np.abs(s.impulses[:, 0]) > 0.0).tolist():
             self._note(c, t, "impact", u, after, float(s.work[c]))
@@ -308,19 +311,21 @@ class ContactJumps(Jumps):
                 f"{start}{names[s.culprit]} closes, and joints or drivers prescribe the motion of "
                 "its bodies: nothing that it pushes with can stop them"
             )
+        if failure == DRIVES:
+            mu = min(s.mu[s.culprit], s.mu_s[s.culprit]) * s.arm[s.culprit]
+            raise SimulationError(f"{start}{words_of_drive(names[s.culprit], mu)}")
         jammed = " with ".join(names[c] for c in np.flatnonzero(s.jams))
         raise SimulationError(
             f"{start}{jammed} jams: its friction presses the bodies together by more than it lets "
             "them give way, and no motion with Coulomb's law goes on from here"
         )
 
-    def _take_decided(self, integration: Integration) -> None:
-        """Make what was decided the state of an integration."""
+    def _take(self, integration: Integration, work: float) -> None:
+        """Make the state ``y``, or the changes that led to it, that of an integration."""
         coordinates, s = self._evaluator.coordinates, self.arrays
         states = s.y[self._evaluator.model.integrated_layout["states"]].copy()
         y = s.y.copy()
         if not coordinates.are_of_bodies:
-            work = float(np.sum(s.work))
             y = coordinates.with_jump(integration.y, s.v - s.v_before, states, work)
             coordinates.displace(y, s.moved)
         self._go_on(integration, y, states)

@@ -3,7 +3,13 @@
 import attrs
 import numpy as np
 
-from dap3d_core.formulations.contacts.contact_table import GAP, REACH, ContactTable
+from dap3d_core.formulations.contacts.contact_table import (
+    GAP,
+    REACH,
+    ContactTable,
+    find_grips,
+)
+from dap3d_core.formulations.contacts.forces import against
 from dap3d_core.formulations.contacts.rows import put_rows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
@@ -21,14 +27,49 @@ PASSES, LEFT = 20_000, 1e-9
 
 
 @attrs.frozen(eq=False)
+class Cone:
+    """Unknown forces of a contact: a normal force, and discs that are as wide as it times mu.
+
+    Attributes:
+        normal: its place among the unknown forces; None of friction without.
+        discs: places of friction, or of moments, that hold, and their mu: a size without a normal.
+    """
+
+    normal: int | None
+    discs: list[tuple[list[int], float]]
+
+    @property
+    def places(self) -> list[int]:
+        """Of all forces."""
+        own = [] if self.normal is None else [self.normal]
+        return own + [place for places, _ in self.discs for place in places]
+
+    def project(self, x: Floats, load: float) -> None:
+        """Take forces x (k,) to the nearest in the cone, in place; load: of what has no normal."""
+        sizes = [float(np.linalg.norm(x[places])) for places, _ in self.discs]
+        if self.normal is None:
+            for size, (places, mu) in zip(sizes, self.discs, strict=True):
+                x[places] *= min(1.0, mu * load / max(size, TINY))
+            return
+        given, N = x[self.normal], max(x[self.normal], 0.0)
+        for _ in self.discs:  # each pass leaves out those that have become wide enough
+            over = [(mu, s) for s, (_, mu) in zip(sizes, self.discs, strict=True) if s > mu * N]
+            pushed = sum(mu * size for mu, size in over)
+            N = max(0.0, (given + pushed) / (1.0 + sum(mu * mu for mu, _ in over)))
+        x[self.normal] = N
+        for size, (places, mu) in zip(sizes, self.discs, strict=True):
+            if size > mu * N:
+                x[places] = mu * N * x[places] / size
+
+
+@attrs.frozen(eq=False)
 class Closed:
     """The contacts that are closed at one instant.
 
     Attributes:
         wrenches: (6 n, k) of their unknown forces, of one each.
         known: (6 n,) friction of a size of its own that slides.
-        cones: contact -> places among the unknown forces: normal force and friction that sticks,
-            and the coefficient of that, or size where there is no normal force.
+        cones: contact -> the cone that its forces are in, with those of what resists at it.
         Lam: (k,) row among those of contacts of each unknown force.
         states: of elements, with modes and directions of sliding.
         loaded: the same where friction of joints, by their load, alone acts.
@@ -37,7 +78,7 @@ class Closed:
 
     wrenches: Floats
     known: Floats
-    cones: dict[int, tuple[list[int], float]]
+    cones: dict[int, Cone]
     Lam: list[int]
     states: Floats
     loaded: Floats
@@ -62,39 +103,48 @@ class ContactForces:
         """Args: the evaluator of the model, in which all contacts are open."""
         self.table = ContactTable(evaluator)
         self._arrays = self.table.arrays()
-        self._arrays.arm[:] = 1.0  # its rows are those of the model
+        s = self._arrays
+        s.arm[:], s.mu[:], s.mu_s[:] = 1.0, self.table.mu, self.table.mu_s  # as rows of the model
         self.outside: tuple[float, float, str] | None = None
 
     def at(self, t: float, u: Floats) -> Closed:
         """The contacts that a state u (13 n,) closes."""
         table, s, evaluator = self.table, self._arrays, self.table.evaluator
         outputs = table.outputs(t, u)
+        find_grips(float(t), s, evaluator.system, table.tensions)
         put_rows(float(t), s, evaluator.system, evaluator.loops)
         still, slip, G = STILL * table.length, s.slip, s.J[len(s.lam_free) :]
         near = (np.abs(outputs[:, GAP]) < CLOSED * table.length) & (outputs[:, REACH] >= 0.0)
-        columns, places, known = [], list[int](), np.zeros(len(s.v))
-        cones: dict[int, tuple[list[int], float]] = {}
+        columns, places, known = list[Floats](), list[int](), np.zeros(len(s.v))
+        cones: dict[int, Cone] = {}
         states, loaded = table.evaluator.states.copy(), table.evaluator.states.copy()
         closed = (near & (np.abs(slip[:, 0]) < still)) | table.alone
         for c in np.flatnonzero(closed).tolist():
-            across = table.across(c)
-            normal, tangents = G[3 * c], G[3 * c : 3 * c + 3][across]
+            across, under = table.across(c), int(table.under[c])
+            if under >= 0 and under not in cones:  # what presses is open
+                continue
+            tangents = G[3 * c : 3 * c + 3][across]
             size = float(np.linalg.norm(slip[c, across]))
             sliding = size > still[c]
             way = slip[c, across] / size if sliding else 0.0 * slip[c, across]
-            friction = -table.mu[c] * (way @ tangents)
-            own, first = [], len(places)
-            if table.alone[c] and sliding and c not in table.loads:
-                known += friction
+            acts = way if s.ratio[c] == 1.0 else np.array(against(s.ratio[c], np.append(0.0, way)))
+            friction = -s.mu[c] * (acts @ tangents)
+            cone = cones.get(under, Cone(None, []))
+            if cone.normal is not None:
+                columns[cone.normal] = columns[cone.normal] + friction
             elif not table.alone[c]:
-                own.append(normal + friction)
+                cone = Cone(len(places), [])
+                columns.append(G[3 * c] + friction)
                 places.append(3 * c)
+            elif sliding and c not in table.loads:
+                known += friction
+            first = len(places)
             for k, tangent in enumerate(tangents, across.start):
-                if not sliding and table.mu_s[c] > 0.0 and tangent.any():
-                    own.append(tangent)
+                if not sliding and s.mu_s[c] > 0.0 and tangent.any():
+                    columns.append(tangent)
                     places.append(3 * c + k)
-            columns += own
-            cones[c] = list(range(first, len(places))), float(table.mu_s[c])
+            cone.discs.append((list(range(first, len(places))), float(s.mu_s[c])))
+            cones |= {c: cone} if under < 0 else {}
             for some in (states, loaded) if c in table.loads and sliding else (states,):
                 some[table.mode[c]] = 1.0 if sliding else 2.0
                 some[table.way[c]] = table.length[c] * way @ s.frames[c, across]
@@ -149,8 +199,8 @@ class ContactForces:
         """By how much forces leave their cones, at most, and the contact."""
         force, worst, name = x[len(x) - len(closed.Lam) :], 0.0, ""
         moved = self._projected(closed, force)
-        for c, (places, _) in closed.cones.items():
-            left = float(np.linalg.norm(moved[places] - force[places]))
+        for c, cone in closed.cones.items():
+            left = float(np.linalg.norm((moved - force)[cone.places]))
             if left > worst:
                 worst, name = left, self.table.names[c]
         return worst, name
@@ -158,20 +208,8 @@ class ContactForces:
     def _projected(self, closed: Closed, force: Floats) -> Floats:
         """The forces in the cones that are nearest to others."""
         found = force.copy()
-        for c, (places, mu) in closed.cones.items():
-            x = force[places]
-            if not places:
-                continue
-            if self.table.alone[c]:
-                found[places] *= min(1.0, mu * closed.load[c] / max(float(np.linalg.norm(x)), TINY))
-                continue
-            N, T = x[0], x[1:]
-            size = float(np.linalg.norm(T))
-            if size > mu * N and size > 0.0:
-                share = max(0.0, (N + mu * size) / (1.0 + mu * mu))
-                found[places] = np.append(share, mu * share * T / size)
-            else:
-                found[places] = np.append(max(N, 0.0), T if N > 0.0 else 0.0 * T)
+        for c, cone in closed.cones.items():
+            cone.project(found, closed.load[c])
         return found
 
     def _least_within(self, closed: Closed, A: Floats, side: Floats) -> Floats:

@@ -49,6 +49,8 @@ def why_stopped(evaluator: Evaluator, integration: Integration, rank: int) -> st
         return f"{head}: {_title(evaluator, integration.terminal_switch)}: {switch.words}"
     if integration.status is Status.CHATTERED:
         return f"{head}: {_chatter(evaluator, integration)}"
+    if integration.status is Status.DRIVEN:
+        return f"{head}: {integration.driving}"
     t_stop = integration.t_stop if integration.t_stop is not None else t
     message = f"{head}: {REASONS[integration.status]}"
     if integration.status is Status.STEP_FLOOR and (step := integration.work.fixed_step):

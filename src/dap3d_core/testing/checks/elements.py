@@ -1,4 +1,4 @@
-"""Checks of functions, of states of elements, and of normals and grips of contacts."""
+"""Checks of functions, of states of elements, and of normals, grips and resistance of contacts."""
 
 import random
 from collections.abc import Mapping
@@ -7,6 +7,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.interface.codegen.kernel_arguments import parameters
+from dap3d_core.interface.contacts.resistance import RESISTED
 from dap3d_core.testing.checks.compare import Comparison, body_words, rates
 from dap3d_core.testing.checks.findings import CheckOutcome
 from dap3d_core.testing.checks.forces import rigid_motion
@@ -43,6 +44,7 @@ _LONG = "the normal is {x.is_:.6g} long; of another length than 1 forces, slip a
 #: Part of its speed at which slip is next to nothing, and tolerance of coefficients there.
 SLOW, CONTINUOUS = 1e-9, 1e-6
 _DRIVES = "grip gives {x.is_:.3g}: a negative coefficient of friction would drive"
+_SPEEDS_UP = "resist gives {x.is_:.3g} m for {what}: what resists by a negative length would drive"
 _NONE = "grip gives none along the grain, and {x.is_:.3g} across it; take a small one"
 _JUMPS = (
     "grip jumps where slip begins: it gives {x.is_:.6g} at next to no speed and {x.should:.6g} at "
@@ -146,4 +148,14 @@ def grip(subject: SampledType) -> CheckOutcome:
         c.compare(sample, np.minimum(mu, 0.0), 0.0, _DRIVES)
         c.compare(sample, np.where(mu[::2] == 0.0, mu[1::2], 0.0), 0.0, _NONE)
         c.compare(sample, near[:2], near[2:], _JUMPS, tolerance=CONTINUOUS)
+    return c.outcome()
+
+
+def resist(subject: SampledType) -> CheckOutcome:
+    """Lengths of what resists rolling and spinning are not negative."""
+    c = Comparison("resist", subject, "resist", "lengths are not negative")
+    for k, (how, (_, what)) in enumerate(RESISTED.items()):
+        for sample in subject.resisting(how).samples:
+            length = np.minimum(sample.value("tension")[-1:], 0.0)
+            c.compare(sample, length, 0.0, _SPEEDS_UP, words={"what": what}, rows=[k])
     return c.outcome()

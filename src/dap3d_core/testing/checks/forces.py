@@ -7,9 +7,10 @@ import numpy as np
 
 from dap3d_core.interface.examine.random_values import numbers, random_pose
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.model.rotations import rotation
 from dap3d_core.testing.checks.compare import Comparison, body_words, rates
 from dap3d_core.testing.checks.findings import CheckOutcome
-from dap3d_core.testing.samples.random_state import Direction, State, rotation
+from dap3d_core.testing.samples.random_state import Direction, State
 from dap3d_core.testing.samples.sampled_type import UNDEFINED, Sample, SampledType
 
 # Texts of findings: formats of the wrong number x and of further words.
@@ -145,7 +146,7 @@ def rigid_motion(
     rng = random.Random(f"{seed} {k}")
     q, shift = np.array(random_pose(rng).p), np.array(numbers(rng, 3))
     speed, spin = (np.array(numbers(rng, 3)) * velocity for _ in range(2))
-    return state.together(q, shift, speed, spin), rotation(q[None])[0]
+    return state.together(q, shift, speed, spin), rotation(q)
 
 
 def _wrench(sample: Sample, kernel: str) -> Floats | None:

@@ -298,7 +298,8 @@ def rank(subject: SampledType) -> CheckOutcome:
     ranks = [(_rank(_rows_of_J(sample) / size), sample) for sample in subject.assembled]
     best, sample = max(ranks, key=lambda pair: pair[0], default=(subject.type.rows, None))
     if sample is not None and best < subject.type.rows:
-        row = _dependent_row(_rows_of_J(sample) / size) + 1
+        rows = _rows_of_J(sample) / size
+        row = next(k for k in range(1, len(rows) + 1) if _rank(rows[:k]) < k)
         off = max(_rank(_rows_of_J(s) / size) for s in subject.samples)
         why = f"row {row} follows from those before it, so one row is too many"
         if off > best:
@@ -322,11 +323,6 @@ def _rows_of_J(sample: Sample) -> Floats:
 def _rank(rows: Floats) -> int:
     """The rank of rows with sizes of about one off the manifold."""
     return int(np.sum(np.linalg.svd(rows, compute_uv=False) > VANISHING))
-
-
-def _dependent_row(rows: Floats) -> int:
-    """The first row in the span of the previous ones."""
-    return next(k for k in range(len(rows)) if _rank(rows[: k + 1]) <= k)
 
 
 def null_space(matrix: Floats) -> Floats:

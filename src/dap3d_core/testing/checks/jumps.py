@@ -6,10 +6,11 @@ import numpy as np
 from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.model.rotations import rotation
 from dap3d_core.testing.checks.compare import Comparison, body_words, rates
 from dap3d_core.testing.checks.findings import CheckOutcome
 from dap3d_core.testing.checks.forces import rigid_motion
-from dap3d_core.testing.samples.random_state import Direction, State, rotation
+from dap3d_core.testing.samples.random_state import Direction, State
 from dap3d_core.testing.samples.sampled_type import Sample, SampledType
 
 #: Factors of the random velocities: both senses, and fast enough for what rests below a speed.
@@ -244,7 +245,7 @@ def _kinetic(state: State) -> float:
 
 def _inertia(state: State, b: int) -> Floats:
     """(3, 3) inertia of a body, global axes."""
-    A = rotation(state.p[b][None])[0]
+    A = rotation(state.p[b])
     return A @ state.Jp[b].reshape(3, 3) @ A.T
 
 

@@ -278,6 +278,8 @@ def draw(
         width = 6 * type_info.type.rows  # type: ignore[attr-defined]
         idx += [0, *(width * k for k in range(len(slots)))]
         idx += [type_info.type.rows] if load else []  # type: ignore[attr-defined]
+        if getattr(type_info.type, "resists", ""):
+            idx.append(type_info.layout.states["near"][0])  # its own, as if of the other
     elif type_info.type.kind == "function":
         idx += [1]
     poses = {s: pose(state.r[k + 1], state.p[k + 1]) for k, s in enumerate(slots)}

@@ -11,6 +11,8 @@ from dap3d_core.interface.examine.random_values import numbers, random_pose
 from dap3d_core.interface.fields import SLOTS
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P, R, V, W
+from dap3d_core.model.rigid_motion import quaternion_product
+from dap3d_core.model.rotations import euler_rates, rotation, skew
 
 #: In place of a function of time: an input, whose value stays.
 HELD = "held"
@@ -118,9 +120,9 @@ class State:
         """The rate of ``body`` along a direction; velocities stay."""
         rate = np.zeros((BODIES, BODY_WIDTH))
         rate[:, R : R + 3] = along.move
-        turned = (along.turn @ _SKEW).reshape(BODIES, 3, 3) @ rotation(self.p)
+        turned = skew(along.turn) @ rotation(self.p)
         rate[:, A : A + 9] = turned.reshape(BODIES, 9)
-        rate[:, P : P + 4] = 0.5 * quaternion_product(_pure(along.turn), self.p)
+        rate[:, P : P + 4] = euler_rates(self.p, along.turn)
         return rate
 
     def table(self) -> Floats:
@@ -154,12 +156,12 @@ class State:
 
     def together(self, q: Floats, shift: Floats, speed: Floats, spin: Floats) -> "State":
         """The state after a common rotation (quaternion) and shift, plus a common velocity."""
-        R = rotation(q[None])[0]
+        R = rotation(q)
         r = self.r @ R.T + shift
         return attrs.evolve(
             self,
             r=r,
-            p=quaternion_product(np.broadcast_to(q, (BODIES, 4)), self.p),
+            p=quaternion_product(q, self.p),
             v=self.v @ R.T + speed + np.cross(spin, r),
             w=self.w @ R.T + spin,
         )
@@ -210,40 +212,3 @@ def _random_bodies(rng: random.Random, count: int) -> tuple[Floats, ...]:
 
 def _row_of_time(rng: random.Random, which: bool | str) -> TimeFunction | HeldInput:
     return HeldInput(*numbers(rng, 1)) if which == HELD else TimeFunction(numbers(rng, 5))
-
-
-def quaternion_product(a: Floats, b: Floats) -> Floats:
-    """The quaternion products a o b of rows of four."""
-    return (a[:, :, None] * b[:, None, :]).reshape(-1, 16) @ _PRODUCT
-
-
-def rotation(p: Floats) -> Floats:
-    """(n, 3, 3) rotation matrices of rows of unit Euler parameters."""
-    return ((p[:, :, None] * p[:, None, :]).reshape(-1, 16) @ _ROTATION).reshape(-1, 3, 3)
-
-
-def _tables() -> tuple[Floats, Floats, Floats]:
-    """Coefficients of quaternion products, rotation matrices and skew matrices.
-
-    A = (e0^2 - e . e) I + 2 e e^T + 2 e0 e~;  a o b = (a0 b0 - u . v, a0 v + b0 u + u x v).
-    """
-    unit = np.eye(3)
-    skew = np.array([np.cross(unit, -e) for e in unit]).transpose(0, 2, 1)
-    turn, product = np.zeros((4, 4, 3, 3)), np.zeros((4, 4, 4))
-    turn[0, 0], product[0, 0, 0] = unit, 1.0
-    for k in range(3):
-        turn[k + 1, k + 1] -= unit
-        turn[0, k + 1] += 2.0 * skew[k]
-        product[k + 1, k + 1, 0] = -1.0
-        product[0, k + 1, k + 1] = product[k + 1, 0, k + 1] = 1.0
-        for n in range(3):
-            turn[k + 1, n + 1, k, n] += 2.0
-            product[k + 1, n + 1, 1:] += np.cross(unit[k], unit[n])
-    return product.reshape(16, 4), turn.reshape(16, 9), skew.reshape(3, 9)
-
-
-_PRODUCT, _ROTATION, _SKEW = _tables()
-
-
-def _pure(turn: Floats) -> Floats:
-    return np.hstack([np.zeros((BODIES, 1)), turn])

@@ -14,6 +14,7 @@ from dap3d_core.interface.codegen.reactions import with_sample_reactions
 from dap3d_core.interface.codegen.specialise import bind_friction, bind_functions
 from dap3d_core.interface.codegen.terms import bind_terms
 from dap3d_core.interface.codegen.type_info import TypeInfo
+from dap3d_core.interface.contacts.resistance import resisting_type
 from dap3d_core.interface.contacts.rows import STICKS
 from dap3d_core.interface.element_states import unknown_names
 from dap3d_core.interface.errors import where_is
@@ -177,6 +178,11 @@ class SampledType:
             "friction",
             lambda: SampledType(bind_friction(self.type_info), self.choices, self.seed, self.poses),
         )
+
+    def resisting(self, how: str) -> "SampledType":
+        """What resists rolling ("roll") or spinning ("spin") at a contact, as a separate type."""
+        type_info = with_functions(examine(resisting_type(self.type, how)), self.choices)
+        return SampledType(type_info, self.choices, self.seed, self.poses)
 
     @property
     def samples(self) -> list[Sample]:

@@ -11,13 +11,6 @@ from support.rotations import to_body
 
 import dap3d_core as dap
 from dap3d_core.assembly.motion import coordinates as motion_coordinates
-from dap3d_core.assembly.motion.coordinates import (
-    aliases,
-    coordinate_rates,
-    coordinate_units,
-    coordinates,
-    joint_coordinates,
-)
 from dap3d_core.simulation import CompiledModel
 
 #: Joints with one factor and with two, axes parallel and not.
@@ -44,7 +37,7 @@ def test_coordinates_are_recovered(keyword, reverse):
         order = np.concatenate([np.arange(motion.size)[c] for c in motion.columns[::-1]])
         motion, q = motion.reversed(), q[..., order]
         pose = inverse(pose)
-    np.testing.assert_allclose(coordinates(motion, pose), q, atol=2e-14)
+    np.testing.assert_allclose(motion_coordinates.coordinates(motion, pose), q, atol=2e-14)
 
 
 @pytest.mark.parametrize("keyword", JOINTS)
@@ -60,7 +53,9 @@ def test_rates_are_those_of_the_coordinates(keyword):
         w = rotation_vector(step.p) / (2.0 * h)
         twist = np.concatenate([_velocity(back, ahead, motion.pose(here), h), w], axis=-1)
         # differences of second order: h^2 with third derivatives of order 1, and 1e-16 / h
-        np.testing.assert_allclose(coordinate_rates(motion, here, twist), rate, atol=3e-9)
+        np.testing.assert_allclose(
+            motion_coordinates.coordinate_rates(motion, here, twist), rate, atol=3e-9
+        )
 
 
 def _velocity(back, ahead, pose, h):
@@ -77,11 +72,15 @@ def test_a_positive_angle_is_a_right_hand_rotation_of_body_i_about_a_j():
     p = np.concatenate([[np.cos(0.15)], np.sin(0.15) * a_j])
     turn = Pose(P_j + 0.2 * a_j, p)
     centred = Pose(start.r - P_j, start.p)
-    q = coordinates(motion, compose(Pose(turn.r[None], turn.p[None]), centred))
+    q = motion_coordinates.coordinates(motion, compose(Pose(turn.r[None], turn.p[None]), centred))
     np.testing.assert_allclose(q[0], [0.2, 0.3], atol=1e-14)
-    assert aliases(motion) == {"length": 0, "angle": 1}
-    assert coordinate_units(motion) == ("m", "rad")
-    assert aliases(motion_of("sph")) == {} == aliases(motion_of("univ"))
+    assert motion_coordinates.aliases(motion) == {"length": 0, "angle": 1}
+    assert motion_coordinates.coordinate_units(motion) == ("m", "rad")
+    assert (
+        motion_coordinates.aliases(motion_of("sph"))
+        == {}
+        == motion_coordinates.aliases(motion_of("univ"))
+    )
 
 
 def test_turns_are_counted_between_instants_far_apart():
@@ -96,7 +95,7 @@ def test_turns_are_counted_between_instants_far_apart():
     a_j = np.array(scene.vectors["a_j"].sp)
     w = rate[:, None, None] * a_j
     v = np.cross(w, r - np.array(scene.points["P_j"].sPp))
-    q, q_dot = joint_coordinates(motion, 1.7 * t, r, p, v / 1.7, w / 1.7)
+    q, q_dot = motion_coordinates.joint_coordinates(motion, 1.7 * t, r, p, v / 1.7, w / 1.7)
     np.testing.assert_allclose(q[:, 0, 0], angle, atol=1e-13)
     np.testing.assert_allclose(q_dot[:, 0, 0], rate / 1.7, atol=1e-13)
 
@@ -105,7 +104,7 @@ def test_a_fixed_joint_has_no_coordinates():
     compiled = compiled_pair("fix", {"body_i": "body"})
     motion = classify(compiled.model).of(0)
     r, p, v, w = (x[None] for x in split(compiled.model.u0))
-    q, q_dot = joint_coordinates(motion, [0.0], r, p, v, w)
+    q, q_dot = motion_coordinates.joint_coordinates(motion, [0.0], r, p, v, w)
     assert (motion.size, q.shape, q_dot.shape) == (0, (1, 1, 0), (1, 1, 0))
     np.testing.assert_allclose(motion.pose(np.zeros((1, 0))).r[0], r[0, 0], atol=1e-15)
 
@@ -117,9 +116,15 @@ def test_coordinates_are_zero_in_the_reference_poses():
     turned = scene.pose(np.array([[0.8]]))
     u = np.concatenate([turned.r[0], turned.p[0], np.zeros(6)])
     given = classify(compiled.model, u).of(0)
-    np.testing.assert_allclose(coordinates(scene, scene.start), [[0.0]], atol=1e-15)
-    np.testing.assert_allclose(coordinates(scene, given.start), [[0.8]], atol=1e-14)
-    np.testing.assert_allclose(coordinates(given, scene.start), [[-0.8]], atol=1e-14)
+    np.testing.assert_allclose(
+        motion_coordinates.coordinates(scene, scene.start), [[0.0]], atol=1e-15
+    )
+    np.testing.assert_allclose(
+        motion_coordinates.coordinates(scene, given.start), [[0.8]], atol=1e-14
+    )
+    np.testing.assert_allclose(
+        motion_coordinates.coordinates(given, scene.start), [[-0.8]], atol=1e-14
+    )
 
 
 def motions(axis, mass=1.0):

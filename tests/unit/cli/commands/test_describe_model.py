@@ -4,7 +4,7 @@ import re
 
 import llvmlite.binding as llvm
 import pytest
-from support.internals import off_constraints, write_program
+from support.internals import off_constraints, scene_program
 from support.plain import long_in_plain_python
 
 import dap3d_core as dap
@@ -31,7 +31,7 @@ def test_they_are_those_that_results_need(name):
     evaluator.start(0.0, evaluator.model.u0)
     for k, program in enumerate(operations(evaluator, 0.0, state)):
         names = {"name": "one", "counter": "two", "general": "three"}
-        text, needs = write_program(evaluator, k, 0.0, state, names)
+        text, needs = scene_program.write_program(evaluator, k, 0.0, state, names)
         arguments = "double, ptr, i64, ptr, i64, ptr, ptr"
         declared = [*needs.values(), f"declare void @three({arguments})"]
         left = without_dead_code("\n".join([*declared, text, "!0 = !{}", "!1 = !{}"]))

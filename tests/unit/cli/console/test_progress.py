@@ -3,14 +3,6 @@
 import pytest
 
 from dap3d_core.cli.console import progress
-from dap3d_core.cli.console.progress import (
-    ONCE,
-    PointsProgress,
-    ProgressBar,
-    live_line,
-    plain_line,
-    points_line,
-)
 from dap3d_core.simulation import RunProgress
 
 
@@ -28,7 +20,7 @@ def standing(t, t_end=100.0):
 
 def test_lines_come_ever_more_rarely_and_estimate_what_is_left(clock, capsys, monkeypatch):
     monkeypatch.delenv("COLUMNS", raising=False)  # lines are as long as they are
-    with ProgressBar(quiet=False) as shown:
+    with progress.ProgressBar(quiet=False) as shown:
         for k in range(101):
             clock[0] = float(k)
             shown.advance(standing(0.5 * k))
@@ -43,14 +35,14 @@ def test_lines_come_ever_more_rarely_and_estimate_what_is_left(clock, capsys, mo
 
 
 def test_compilation_is_announced_once_with_its_names(capsys):
-    with ProgressBar(quiet=False) as shown:
+    with progress.ProgressBar(quiet=False) as shown:
         shown.announce("sph: C")
         shown.announce("rev: C")
-    assert capsys.readouterr().err.splitlines() == [ONCE, "  sph: C", "  rev: C"]
+    assert capsys.readouterr().err.splitlines() == [progress.ONCE, "  sph: C", "  rev: C"]
 
 
 def test_quiet_is_quiet(clock, capsys):
-    with ProgressBar(quiet=True) as shown:
+    with progress.ProgressBar(quiet=True) as shown:
         shown.announce("sph: C")
         shown.start()
         for k in range(100):
@@ -64,7 +56,7 @@ def test_quiet_is_quiet(clock, capsys):
 def test_the_live_line_says_everything_from_60_columns_on(width, t_end, rate):
     """Time, step, pace, drift and what is left, whenever that is less than an hour."""
     run = standing(0.37 * t_end, t_end)
-    line = live_line(run, rate, width)
+    line = progress.live_line(run, rate, width)
     assert len(line) <= width
     left = 0.63 * t_end / rate
     if left < 3599.0:
@@ -73,24 +65,27 @@ def test_the_live_line_says_everything_from_60_columns_on(width, t_end, rate):
 
 
 def test_the_live_line_keeps_its_width_and_fits_any_terminal():
-    lines = [live_line(standing(t, 20.0), 5.0 + 0.01 * t, 77) for t in (0.1, 3.0, 9.99, 15.0, 19.9)]
+    lines = [
+        progress.live_line(standing(t, 20.0), 5.0 + 0.01 * t, 77)
+        for t in (0.1, 3.0, 9.99, 15.0, 19.9)
+    ]
     assert len({len(line) for line in lines}) == 1
     for width in range(4, 60):
-        assert len(live_line(standing(37.0), 0.01, width)) <= width
-    assert "about ? left" in plain_line(standing(0.1), 0.0)  # before the pace is known
+        assert len(progress.live_line(standing(37.0), 0.01, width)) <= width
+    assert "about ? left" in progress.plain_line(standing(0.1), 0.0)  # before the pace is known
 
 
 @pytest.mark.parametrize(
     ("rate", "words"), [(0.0, "-:-- left"), (1.0, "1:03 left"), (0.01, "1:45:00 left")]
 )
 def test_what_is_left_is_shown_as_by_a_clock(rate, words):
-    assert live_line(standing(37.0), rate, 107).endswith(words)
+    assert progress.live_line(standing(37.0), rate, 107).endswith(words)
 
 
 def test_points_are_counted_with_their_rate_and_what_is_left(clock, capsys, monkeypatch):
     """A sweep that goes on has some points already: they are none of its pace."""
     monkeypatch.delenv("COLUMNS", raising=False)
-    with PointsProgress(quiet=False) as shown:
+    with progress.PointsProgress(quiet=False) as shown:
         for k in range(51):
             clock[0] = float(k)
             shown.count(500 + 10 * k, 1000)
@@ -104,7 +99,7 @@ def test_points_are_counted_with_their_rate_and_what_is_left(clock, capsys, monk
 @pytest.mark.parametrize(("total", "rate"), [(3, 0.0), (1000, 5.0), (10**8, 0.0123)])
 def test_the_line_of_points_fits(width, total, rate):
     """Its parts all stand from 58 columns on, but where a hundred million take weeks."""
-    words = points_line(total // 3, total, rate, width)
+    words = progress.points_line(total // 3, total, rate, width)
     assert len(words) <= width
     assert words.startswith(" 33%")
     if width >= 58 and rate != 0.0123:
@@ -115,7 +110,7 @@ def test_the_line_of_points_fits(width, total, rate):
 def test_a_long_correction_says_that_it_goes_on(capfd, monkeypatch):
     """Elsewhere than on a terminal, until the run tells of itself: no command hangs wordless."""
     monkeypatch.setattr(progress, "SILENCE", 0.01)
-    with ProgressBar(quiet=False) as shown:
+    with progress.ProgressBar(quiet=False) as shown:
         shown.start()
         said = ""
         while said.count("\n") < 2:  # ends as soon as the second line is there
@@ -129,7 +124,7 @@ def test_a_long_correction_says_that_it_goes_on(capfd, monkeypatch):
 
 def test_a_run_that_cannot_leave_its_start_is_told_of(clock, capsys):
     """Steps that are rejected again and again at t = 0 are work without an end, too."""
-    with ProgressBar(quiet=False) as shown:
+    with progress.ProgressBar(quiet=False) as shown:
         for k in range(5):
             clock[0] = float(k)
             shown.advance(standing(0.0))

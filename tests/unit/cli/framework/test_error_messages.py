@@ -8,7 +8,6 @@ from click.testing import CliRunner
 from support.internals import Refused, Terminated
 
 from dap3d_core.cli.framework import error_messages
-from dap3d_core.cli.framework.error_messages import report_error
 
 
 def reported(error, debug=False):
@@ -16,7 +15,9 @@ def reported(error, debug=False):
 
     @click.command()
     def command():
-        click.get_current_context().exit(report_error(error, debug=debug, as_json=True))
+        click.get_current_context().exit(
+            error_messages.report_error(error, debug=debug, as_json=True)
+        )
 
     done = CliRunner().invoke(command)
     return done.exit_code, json.loads(done.stdout), done.stderr
@@ -55,5 +56,5 @@ def test_errors_of_libraries_without_memory_are_a_lack_of_it(monkeypatch, capsys
     """They fail in words of their own where the limit on memory leaves nothing."""
     monkeypatch.setattr(error_messages, "is_used_up", lambda: True)
     monkeypatch.setattr(error_messages, "address_space", lambda: 400_000 * 1024)
-    assert report_error(error, debug=False, as_json=False) == 1
+    assert error_messages.report_error(error, debug=False, as_json=False) == 1
     assert capsys.readouterr().err.startswith("there is not enough memory for this")

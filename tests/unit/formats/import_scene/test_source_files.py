@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from support.internals import FormatError
+from support.internals import FormatError, source_files
 from support.rotations import rotation
 
 import dap3d_core as dap
-from dap3d_core.formats.import_scene.source_files import SourceFiles
 
 INNER = """
 <sdf version="1.9"><model name="finger">
@@ -73,7 +72,7 @@ def test_text_is_utf_8(tmp_path, data, found):
     path = tmp_path / "a.txt"
     path.write_bytes(data)
     try:
-        text = SourceFiles(path, tmp_path).read_text()
+        text = source_files.SourceFiles(path, tmp_path).read_text()
     except FormatError as error:
         text = str(error)
     assert text == found

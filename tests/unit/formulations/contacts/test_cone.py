@@ -4,16 +4,15 @@ import numpy as np
 import pytest
 from support.plain import long_in_plain_python
 
-from dap3d_core.formulations.contacts.cone import TRIES, cone_of
-from dap3d_core.formulations.contacts.cone import solve_cone as solve
+from dap3d_core.formulations.contacts import cone
 
 
 def solve_cone(A, b, mu):
     """The solution of a problem, and its residual."""
-    problem = cone_of(len(mu))
+    problem = cone.cone_of(len(mu))
     problem.count = len(mu)
     problem.A[:], problem.b[:], problem.mu[:] = A, b, mu
-    left = solve(problem, TRIES)
+    left = cone.solve_cone(problem, cone.TRIES)
     return problem.x, left
 
 

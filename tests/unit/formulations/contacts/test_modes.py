@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from support.internals import ContactTable
 
 import dap3d_core as dap
-from dap3d_core.formulations.contacts.contact_table import ContactTable
 from dap3d_core.formulations.contacts.decide import find_modes_at_rest
 from dap3d_core.simulation import CompiledModel
 

@@ -7,7 +7,6 @@ from unit.formulations.joint_loops.test_equations import ladder
 
 import dap3d_core as dap
 from dap3d_core.formulations.joint import coordinates as module
-from dap3d_core.formulations.joint.coordinates import cost_over_standard
 from dap3d_core.simulation import CompiledModel
 
 
@@ -79,5 +78,5 @@ def test_the_cost_is_known_without_a_run_by_method_joint():
         CompiledModel(scene, method="standard")
         for scene in (trees.mixed_chain(20), ladder(12))
     )  # fmt: skip
-    assert 0.2 < cost_over_standard(chain.model, chain.evaluator.plan) < 0.6
-    assert cost_over_standard(net.model, net.evaluator.plan) > 1.2
+    assert 0.2 < module.cost_over_standard(chain.model, chain.evaluator.plan) < 0.6
+    assert module.cost_over_standard(net.model, net.evaluator.plan) > 1.2

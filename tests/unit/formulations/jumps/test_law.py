@@ -7,7 +7,6 @@ from support.jumping import JUMPING
 
 import dap3d_core as dap
 from dap3d_core.formulations.jumps import law as law_module
-from dap3d_core.formulations.jumps.law import JumpLaw
 from dap3d_core.formulations.jumps.multipliers import find_impulses
 
 
@@ -29,7 +28,7 @@ def velocities_after(masses, velocities, e, **more):
     compiled = balls(masses, velocities, e, **more)
     none = np.zeros(len(masses) - 1)
     y = compiled.evaluator.integrated(compiled.model.u0)
-    jump = JumpLaw(compiled.evaluator).jump(0.0, y, None, none, 1e-12)
+    jump = law_module.JumpLaw(compiled.evaluator).jump(0.0, y, None, none, 1e-12)
     return np.array(velocities) + jump.dv.reshape(-1, 6)[:, 0], jump
 
 

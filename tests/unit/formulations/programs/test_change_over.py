@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from support.internals import BEHIND, change_over, scene_program
+from support.internals import change_over, scene_program
 from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.formulations import PROJECT, REPORT, RHS, WATCH
-from dap3d_core.formulations.programs.change_over import ChangeOver
 from dap3d_core.integrators import EXPLICIT
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
@@ -56,7 +55,7 @@ def test_bits_are_those_of_general_code(model, method, at_once):
         assert_same(result, general(model, method=method))
     found = programs(at_once)
     assert found[RHS].failures() == 0
-    assert set(found) - {REPORT} in ({RHS}, {RHS, PROJECT, BEHIND})
+    assert set(found) - {REPORT} in ({RHS}, {RHS, PROJECT, scene_program.BEHIND})
 
 
 @pytest.mark.every(2)
@@ -75,7 +74,7 @@ def test_many_reports_have_a_program(model, method, at_once):
 def test_switches_have_programs(at_once):
     """A tricycle watches whether its disks lie."""
     assert_same(dap.simulate("tri", **SETTINGS), general("tri"))
-    assert set(programs(at_once)) == {RHS, PROJECT, BEHIND, WATCH}
+    assert set(programs(at_once)) == {RHS, PROJECT, scene_program.BEHIND, WATCH}
 
 
 def sliding_rod():
@@ -147,9 +146,9 @@ def test_controllers_run_by_programs(at_once):
 @pytest.mark.parametrize("record", [None, change_over.Record()])
 def test_a_call_that_needs_programs_is_not_made_without_them(record, monkeypatch):
     """Also where another thread has just given them up."""
-    monkeypatch.setattr(ChangeOver, "_record_of", lambda self, modes, start: record)
+    monkeypatch.setattr(change_over.ChangeOver, "_record_of", lambda self, modes, start: record)
     calls, addresses = [], np.zeros(2, dtype=np.int64)
-    call = ChangeOver(dap.compile("pen1").evaluator).call
+    call = change_over.ChangeOver(dap.compile("pen1").evaluator).call
     given = addresses, lambda: (0.0, np.zeros(0)), lambda: (0, 0, 0)
     call(lambda: calls.append("needed"), *given, needs_programs=True)
     call(lambda: calls.append("not needed"), *given)
@@ -180,7 +179,7 @@ def test_numbers_that_change_in_a_run_stop_the_program(at_once):
         return advance(budget)
 
     integration.advance = advanced
-    programs = ChangeOver(evaluator)
+    programs = change_over.ChangeOver(evaluator)
     programs.during(integration, lambda: integration.advance(1))
     assert np.array_equal(addresses, before)
     evaluator.system.par[0] += 1e-3
@@ -203,7 +202,7 @@ def test_a_program_whose_guards_fail_is_given_up(at_once, monkeypatch):
 def test_two_threads_give_up_one_projection_once():
     """What reads the right-hand side's factors never stands behind a program of that."""
     rhs, project, behind = ("rhs",), ("project",), ("behind",)
-    programs = {RHS: rhs, PROJECT: project, BEHIND: behind}
+    programs = {RHS: rhs, PROJECT: project, scene_program.BEHIND: behind}
     record = change_over.Record(programs, anew=(0.0, np.zeros(1)))
     for _ in range(2):
         change_over._give_up(record, project, PROJECT, record.anew)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.internals import MASS, Item, StraightLine, Symbol, constant_numbers, constant_parts
+from support.internals import MASS, Item, StraightLine, Symbol, scene_program
 
 import dap3d_core as dap
 from dap3d_core.formulations.programs.symbolic_arrays import SymbolicSystem, constants
@@ -33,13 +33,13 @@ def test_no_run_changes_a_constant(model, method):
     evaluator = dap.compile(model, method=method).evaluator
     y0 = evaluator.coordinates.start(evaluator.model.u0)
     evaluator.start(0.0, evaluator.model.u0)
-    parts = constant_parts(evaluator)
-    before = constant_numbers(parts)
+    parts = scene_program.constant_parts(evaluator)
+    before = scene_program.constant_numbers(parts)
     options = {"report_size": evaluator.report_size, "length_count": evaluator.length_count}
     integration = EXPLICIT.make(evaluator, y0, np.array([0.0, 0.02]), project_on=True, **options)
     integration.advance(10**6)
     assert integration.statistics.projections > 0
-    assert constant_numbers(parts) == before
+    assert scene_program.constant_numbers(parts) == before
 
 
 def test_arrays_that_share_memory_share_symbols(evaluator):

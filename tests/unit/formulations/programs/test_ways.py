@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.internals import compiled, load_programs, objects, off_constraints, write_programs
+from support.internals import compiled, objects, off_constraints, scene_program
 from support.plain import jit_is_on
 
 import dap3d_core as dap
@@ -46,8 +46,10 @@ def test_bits_are_those_of_general_code(model, method, first_rate, others, failu
     assert [out[0] for _, out in general] == [1.0, 1.0, 0.0]
 
     name = f"{model}_{method}_{failures}"
-    text, written = write_programs(evaluator, name, 0.0, off, others=others)
-    programs = load_programs(evaluator, name, written, objects.optimised(text, written, None))
+    text, written = scene_program.write_programs(evaluator, name, 0.0, off, others=others)
+    programs = scene_program.load_programs(
+        evaluator, name, written, objects.optimised(text, written, None)
+    )
     functions.addresses[PROJECT] = programs[PROJECT].address
     for y, (state, outcome) in zip(states, general, strict=True):
         found, out = projected(y)

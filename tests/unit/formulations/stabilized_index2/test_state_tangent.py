@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from support.internals import MOST_STAGES
 from support.state_types import MASS, REGISTRY, C, K, pulled, steered
 
 import dap3d_core as dap
 from dap3d_core.integrators import INTEGRATORS
-from dap3d_core.integrators.radau.tableau import MOST_STAGES
 
 
 def radau_of(compiled):

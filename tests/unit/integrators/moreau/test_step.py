@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.internals import placed_shapes
 from support.plain import jit_is_on
 from support.process import run
 from verification.test_stepping import ball, collide, slope, tower
 from verification.test_sticking_under_load import pendulum
 
 import dap3d_core as dap
-from dap3d_core.assembly.collisions import placed_shapes
 from dap3d_core.integrators.moreau import arrays, problem
 
 

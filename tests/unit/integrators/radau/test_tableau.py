@@ -4,8 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-
-from dap3d_core.integrators.radau.tableau import COEFFICIENTS, STAGES, radau_method
+from support.internals import COEFFICIENTS, STAGES, radau_method
 
 
 def of(k):

@@ -5,6 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from support.internals import Shape, entry_fields, sample_classes, shared_slots, sized
 
 import dap3d_core as dap
 from dap3d_core.interface import (
@@ -17,13 +18,6 @@ from dap3d_core.interface import (
     points,
     table,
     vectors,
-)
-from dap3d_core.interface.examine.sized_types import (
-    Shape,
-    entry_fields,
-    sample_classes,
-    shared_slots,
-    sized,
 )
 from dap3d_core.kernels import by_body, cross, dot, item, neg, scale, sub
 from dap3d_core.testing import check_type

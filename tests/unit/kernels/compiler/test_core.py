@@ -15,7 +15,7 @@ pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 SCRIPT = """
 import json, sys, warnings
 sys.path[:0] = [{tests!r}, {tests!r} + "/unit"]
-from support.recorded_calls import Recorder, differences
+from support.recorded_calls import Recorder, Translated, differences
 import numpy as np
 import dap3d_core as dap
 warnings.simplefilter("ignore")
@@ -23,9 +23,10 @@ recorder = Recorder()
 {scenarios}
 few = list(recorder.calls)
 {more}
-calls = recorder.calls
-print(json.dumps([[len(few), differences(few, {few})],
-                  [len(calls), {all} and differences(calls, {all})], recorder.missing()]))
+calls, translated = recorder.calls, Translated()
+print(json.dumps([[len(few), differences(few, {few}, translated)],
+                  [len(calls), {all} and differences(calls, {all}, translated)],
+                  recorder.missing()]))
 """
 QUICK = [("pen1", {"t_end": 0.002, "dt": 0.001})]
 RUNS = [*QUICK, *short_runs(0.001)]

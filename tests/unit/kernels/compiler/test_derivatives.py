@@ -16,18 +16,18 @@ from support.internals import (
     MATRIX,
     Arrays,
     CompileError,
+    DifferentiatedArrays,
     Program,
     compiled,
+    differentiated,
     pointer,
-    type_of,
+    units,
 )
 from support.plain import jit_is_on
 from support.structs import Inner, Numbers
 
 from dap3d_core.kernels import scalar_math
 from dap3d_core.kernels.compiler.derivatives import differentiate
-from dap3d_core.kernels.runtime.lanes import DifferentiatedArrays, differentiated
-from dap3d_core.kernels.scalar_math import is_differentiated, values_alone, with_slopes
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 
@@ -79,14 +79,17 @@ def with_corners(numbers):
 @compiled
 def with_remarks(numbers):
     x, out = numbers.x, numbers.out
-    out[0] = with_slopes(x[0], x[1] * x[2])
-    out[1] = with_slopes(x[0], 0.0)
-    out[2] = 2.0 if is_differentiated() else 1.0
+    out[0] = scalar_math.with_slopes(x[0], x[1] * x[2])
+    out[1] = scalar_math.with_slopes(x[0], 0.0)
+    out[2] = 2.0 if scalar_math.is_differentiated() else 1.0
+    product = x[1] * x[2]
+    for k in range(scalar_math.slope_count()):
+        out[3 + k] = scalar_math.slope(product, k)
 
 
 @compiled
 def norm(numbers):
-    values_alone()
+    scalar_math.values_alone()
     x, out = numbers.x, numbers.out
     largest = 0.0
     for k in range(3):
@@ -118,7 +121,7 @@ def differentiated_run(function, one, directions):
     wide = DifferentiatedArrays(one, 1 + directions.shape[1])
     wide.slopes(one.x)[:] = directions
     wide.slopes(one.inner.table)[:] = np.repeat(directions, 2, axis=0)
-    entry = differentiated(function.compile([type_of(one)]), 1 + directions.shape[1])
+    entry = differentiated(function.compile([units.type_of(one)]), 1 + directions.shape[1])
     entry(wide)
     wide.give()
     return one.out.copy(), wide.slopes(one.out).copy()
@@ -181,18 +184,20 @@ def test_slopes_of_analytic_functions_are_those_of_complex_steps():
         np.testing.assert_allclose(found, np.imag(expected) / step, rtol=1e-13, atol=1e-14)
 
 
-def test_code_says_what_derivatives_of_results_are():
+@pytest.mark.parametrize("count", [3, 4])  # within vectors of four; beside
+def test_code_says_what_derivatives_of_results_are(count):
     one = arrays(np.random.default_rng(1))
-    directions = np.eye(3)
+    directions = np.eye(3, count)
     values, slopes = differentiated_run(with_remarks, one, directions)
-    assert values[:3].tolist() == [one.x[0], one.x[0], 2.0]
-    np.testing.assert_array_equal(slopes[0], [0.0, one.x[2], one.x[1]])
-    assert not slopes[1].any()
+    assert values[:6].tolist() == [one.x[0], one.x[0], 2.0, 0.0, one.x[2], one.x[1]]
+    np.testing.assert_array_equal(slopes[0, :3], [0.0, one.x[2], one.x[1]])
+    assert not slopes[1:6].any()
     plain = changed(one, np.zeros(3), 0.0)
     with_remarks(plain)
-    assert plain.out[:3].tolist() == [one.x[0], one.x[0], 1.0]
+    assert plain.out[:4].tolist() == [one.x[0], one.x[0], 1.0, one.out[3]]
     assert scalar_math.with_slopes(1.0, 2.0) == 1.0
     assert not scalar_math.is_differentiated()
+    assert scalar_math.slope(1.0, 0) == scalar_math.slope_count() == 0
 
 
 def test_norms_have_values_alone():

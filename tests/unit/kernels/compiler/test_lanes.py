@@ -4,12 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from support.internals import CompileError, compiled, pointer
+from support.internals import CompileError, WideArrays, compiled, pointer, wide_function
 from support.plain import jit_is_on
 from support.structs import Inner, Numbers
 
 from dap3d_core.kernels.compiler import lanes
-from dap3d_core.kernels.runtime.lanes import WideArrays, wide_function
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 COUNT = 4

@@ -7,18 +7,7 @@ from itertools import count
 
 import numpy as np
 import pytest
-from support.internals import (
-    FLOAT,
-    Array,
-    Entry,
-    Functions,
-    Program,
-    Signature,
-    Unit,
-    background,
-    objects,
-    units,
-)
+from support.internals import FLOAT, Array, Program, Signature, background, objects, units
 from support.plain import jit_is_on
 from support.process import run, start
 
@@ -40,7 +29,7 @@ def write(symbols):
 
 
 def entry_of(folder, **options):
-    return Entry(Unit("doubled", 1, write, folder, **options), 0, SIGNATURE)
+    return units.Entry(units.Unit("doubled", 1, write, folder, **options), 0, SIGNATURE)
 
 
 def answer(entry):
@@ -127,9 +116,9 @@ def test_files_that_killed_processes_left_behind_are_removed(tmp_path, monkeypat
 
 def test_code_is_made_well_once_it_has_run_for_long(tmp_path, alone, monkeypatch):
     """On one core; a table then holds the better code, and so do calls from Python."""
-    unit = Unit("doubled", 1, write, tmp_path)
-    entry = Entry(unit, 0, SIGNATURE)
-    table = Functions(SIGNATURE, [entry])
+    unit = units.Unit("doubled", 1, write, tmp_path)
+    entry = units.Entry(unit, 0, SIGNATURE)
+    table = units.Functions(SIGNATURE, [entry])
     assert answer(entry) == 42.0
     quick = unit.addresses[0]
     assert not unit.is_optimised
@@ -151,8 +140,8 @@ def test_a_process_beside_makes_code_well(tmp_path, monkeypatch):
     monkeypatch.setattr(background, "core_count", lambda: 2)
     optimiser = background.Optimiser()
     monkeypatch.setattr(background, "optimiser", optimiser)
-    unit = Unit("doubled", 1, write, tmp_path)
-    entry = Entry(unit, 0, SIGNATURE)
+    unit = units.Unit("doubled", 1, write, tmp_path)
+    entry = units.Entry(unit, 0, SIGNATURE)
     optimiser._process.stdin.close()
     assert optimiser._process.wait(timeout=120) == 0
     assert [f.name for f in tmp_path.iterdir()] == ["doubled.o"]

@@ -6,9 +6,19 @@ import attrs
 import numpy as np
 import pytest
 from support.at_all_levels import compiled_at_all_levels, function_of
-from support.internals import FLOAT, INT, CompileError, Program, compiled, jit_is_on
-
-from dap3d_core.kernels.runtime.array_struct import INTEGERS, MATRIX, Arrays, Scalar, pointer
+from support.internals import (
+    FLOAT,
+    INT,
+    INTEGERS,
+    MATRIX,
+    Arrays,
+    CompileError,
+    Program,
+    Scalar,
+    compiled,
+    jit_is_on,
+    pointer,
+)
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)

@@ -4,7 +4,7 @@ import sys
 
 import numpy as np
 import pytest
-from support.internals import FLOAT, Array, Entry, Program, Signature, Unit, objects, ready, units
+from support.internals import FLOAT, Array, Program, Signature, objects, ready, units
 from support.plain import jit_is_on
 from support.process import REPOSITORY
 
@@ -37,8 +37,8 @@ def here():
 def value(folder=None):
     """The curve at 0.7, and whether its code was made here."""
     units.compiled_units.clear()
-    entry = Entry(
-        Unit("curve-here", 1, write, folder, optimise=True, ready_name=NAME), 0, SIGNATURE
+    entry = units.Entry(
+        units.Unit("curve-here", 1, write, folder, optimise=True, ready_name=NAME), 0, SIGNATURE
     )
     out = np.zeros(1)
     entry(0.7, out)

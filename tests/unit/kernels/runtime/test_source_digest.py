@@ -4,10 +4,9 @@ import shutil
 from pathlib import Path
 
 import pytest
-from support.internals import Loop, LoopArrays, Struct, source_of, unit_names
+from support.internals import Loop, LoopArrays, Struct, source_digest, source_of, unit_names
 
 import dap3d_core
-from dap3d_core.kernels.runtime import source_digest
 
 
 @pytest.fixture

@@ -7,15 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.graphs import GRAPHS, RANDOM, Case, chain, check_solution, star
-from support.internals import make_plan
+from support.internals import make_plan, rank
 from support.nets import fourbars, ladder, plate_net, rod_net
 from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.linear.ldlt import plan
 from dap3d_core.linear.ordering import elimination_order, ordering
-from dap3d_core.linear.ordering.elimination_order import dissect, order_nodes
-from dap3d_core.linear.rank import rank
 
 EPS = np.finfo(float).eps
 
@@ -30,7 +28,7 @@ def test_fill_of_a_net_grows_as_nested_dissection_promises(net):
     """Of k x k knots the fill is O(k^2 log k), the work O(k^3) (George 1973): from k to 2 k fill
     grows by 4 (1 + 1 / log k), work by 8, and lower terms, here a fifth, in which leaves that
     minimum degree orders play a part."""
-    small, large = (order_nodes(*arguments(net(k))) for k in (14, 28))
+    small, large = (elimination_order.order_nodes(*arguments(net(k))) for k in (14, 28))
     fill = [sum(map(len, found.below)) for found in (small, large)]
     assert fill[1] <= 1.2 * 4 * (1 + 1 / log2(14)) * fill[0]
     assert large.work <= 1.2 * 8 * small.work
@@ -40,26 +38,26 @@ def test_the_cheaper_order_is_taken(monkeypatch):
     """On a net of plates nested dissection takes less work than minimum degree alone; where it
     takes more, minimum degree stays."""
     n, slots, rows = arguments(plate_net(18))
-    dissected = order_nodes(n, slots, rows).work
+    dissected = elimination_order.order_nodes(n, slots, rows).work
     monkeypatch.setattr(elimination_order, "WIDE", 10**9)
-    greedy = order_nodes(n, slots, rows).work
+    greedy = elimination_order.order_nodes(n, slots, rows).work
     assert dissected < 0.8 * greedy
     monkeypatch.setattr(elimination_order, "WIDE", 0)
     monkeypatch.setattr(elimination_order, "dissect", lambda neighbours, weight: range(len(weight)))
-    assert order_nodes(n, slots, rows).work == greedy
+    assert elimination_order.order_nodes(n, slots, rows).work == greedy
 
 
 def test_separators_separate():
     """No edge joins nodes of stage 0 that belong to different leaves, and leaves are small."""
     n, slots, rows = arguments(plate_net(20))
-    found = order_nodes(n, slots, rows)
+    found = elimination_order.order_nodes(n, slots, rows)
     of_body = [set() for _ in range(n + 1)]
     for k, node in enumerate(found.nodes):
         for b in node.bodies:
             of_body[b].add(k)
     neighbours = [set().union(*(of_body[b] for b in node.bodies)) - {k}
                   for k, node in enumerate(found.nodes)]  # fmt: skip
-    stage = dissect(neighbours, [node.rows for node in found.nodes])
+    stage = elimination_order.dissect(neighbours, [node.rows for node in found.nodes])
     seen = set()
     for start in range(len(stage)):
         if stage[start] == 0 and start not in seen:
@@ -93,7 +91,7 @@ def test_cost_of_a_row_of_loops_is_linear(family):
 def test_trees_are_not_dissected(graph, monkeypatch):
     """Their fronts are narrow: no other order is tried, no panel made."""
     monkeypatch.delattr(elimination_order, "dissect")
-    assert order_nodes(*arguments(graph)).panels == ()
+    assert elimination_order.order_nodes(*arguments(graph)).panels == ()
 
 
 @pytest.fixture(params=[0.3, 0.9] if jit_is_on() else [0.3])
@@ -220,7 +218,7 @@ def test_the_program_is_found_once_for_all_runs_and_steps(monkeypatch):
 
     def counted(*given, **options):
         calls.append(given)
-        return order_nodes(*given, **options)
+        return elimination_order.order_nodes(*given, **options)
 
     monkeypatch.setattr(plan, "order_nodes", counted)
     scene = dap.Scene(name="two rods")

@@ -12,10 +12,8 @@ from support.graphs import (
     two_wheels,
     wheel,
 )
+from support.internals import rank
 from support.plain import long_in_plain_python
-
-from dap3d_core.linear.rank import rank
-from dap3d_core.linear.rank.rank import dense_rank, sparse_rank
 
 REDUNDANT = {
     "two hinges": lambda rng: (2, [((1, 0), 5), ((2, 1), 5), ((1, 2), 4)]),
@@ -47,7 +45,7 @@ def sparse(request, monkeypatch):
         monkeypatch.setattr(rank, "PART_ROWS", 0)
     if request.param == "iteration":
         monkeypatch.setattr(rank, "by_elimination", lambda problem, K: None)
-    return sparse_rank
+    return rank.sparse_rank
 
 
 def projector(found):
@@ -72,7 +70,7 @@ def test_both_ranks_agree(name, sparse):
     for seed in range(2):
         rng = np.random.default_rng(seed)
         case = Case(REDUNDANT[name](rng), rng)
-        dense = dense_rank(case.dense)
+        dense = rank.dense_rank(case.dense)
         found = sparse(case.plan, case.D, case.places, 6 * case.n)
         assert (dense.rank, dense.redundant, dense.dof) == (found.rank, found.redundant, found.dof)
         assert projector(found) == pytest.approx(projector(dense), abs=1e-8)
@@ -83,7 +81,7 @@ def test_both_ranks_agree(name, sparse):
 def test_the_ways_are_the_ones_that_were_meant(monkeypatch):
     """A ring has a part: singular values, elimination, inverse iteration; a chain has none."""
     case = full_case("chain")
-    assert sparse_rank(case.plan, case.D, case.places, 6 * case.n).method == "leaves"
+    assert rank.sparse_rank(case.plan, case.D, case.places, 6 * case.n).method == "leaves"
     rng = np.random.default_rng(0)
     case = Case(ring(9, 5), rng)
     methods = []
@@ -91,7 +89,7 @@ def test_the_ways_are_the_ones_that_were_meant(monkeypatch):
         monkeypatch.setattr(rank, "PART_ROWS", limit)
         if not proof:
             monkeypatch.setattr(rank, "by_elimination", lambda problem, K: None)
-        methods.append(sparse_rank(case.plan, case.D, case.places, 6 * case.n).method)
+        methods.append(rank.sparse_rank(case.plan, case.D, case.places, 6 * case.n).method)
     assert methods == ["svd of parts", "elimination", "inverse iteration"]
 
 
@@ -140,7 +138,7 @@ def test_a_pivot_that_rounding_hides_is_no_proof():
             case.dense[row, 6 * b - 6 : 6 * b] = case.D[at + 6 : at + 12]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(rank, "PART_ROWS", 0)
-        found = sparse_rank(case.plan, case.D, case.places, 6 * case.n)
+        found = rank.sparse_rank(case.plan, case.D, case.places, 6 * case.n)
     assert found.method == "inverse iteration"
     assert found.rank == np.linalg.matrix_rank(case.dense, tol=1e-10) == 24
 
@@ -151,15 +149,15 @@ def test_dense_rank_names_the_rows_of_a_dependency():
     rng = np.random.default_rng(4)
     D = rng.normal(size=(5, 12))
     D[3] = D[0] + 2.0 * D[1]
-    found = dense_rank(D)
+    found = rank.dense_rank(D)
     assert (found.rows, found.columns, found.rank, found.redundant, found.dof) == (5, 12, 4, 1, 8)
     assert found.shared.tolist() == [0, 1, 3]
     (dependency,) = found.dependencies
     assert dependency.combinations @ D[[0, 1, 3]] == pytest.approx(np.zeros((1, 12)), abs=1e-14)
     weights = dependency.combinations[0] / dependency.combinations[0, 2]
     assert weights == pytest.approx([-1.0, -2.0, 1.0], abs=1e-13)
-    assert dense_rank(np.zeros((0, 6))).rank == 0
-    assert dense_rank(np.zeros((2, 6))).rank == 0
+    assert rank.dense_rank(np.zeros((0, 6))).rank == 0
+    assert rank.dense_rank(np.zeros((2, 6))).rank == 0
 
 
 def test_rows_that_depend_on_different_ones_are_told_apart():
@@ -169,7 +167,7 @@ def test_rows_that_depend_on_different_ones_are_told_apart():
     D = rng.normal(size=(6, 12))
     D[5] = D[0] - 3.0 * D[3]
     D[4] = 0.5 * D[1]
-    found = dense_rank(D)
+    found = rank.dense_rank(D)
     assert [d.rows.tolist() for d in found.dependencies] == [[0, 3, 5], [1, 4]]
     assert [d.combinations.shape for d in found.dependencies] == [(1, 3), (1, 2)]
     for dependency in found.dependencies:
@@ -182,4 +180,4 @@ def test_a_row_within_the_blur_is_dependent(blur):
     rng = np.random.default_rng(7)
     D = rng.normal(size=(3, 6))
     D[2] = D[1] + 1e-9 * rng.normal(size=6)
-    assert dense_rank(D, blur).redundant == int(blur > 0.0)
+    assert rank.dense_rank(D, blur).redundant == int(blur > 0.0)

@@ -13,7 +13,7 @@ def compared(model, names, factors, folder, t_end=0.3, **settings):
     outputs = states_of(scene)
     made, library = exported(scene, folder, outputs=outputs, parameters=names, **settings)
     run, other = library.start(t_end), scene.copy()
-    from dap3d_core.study.parameters import parameters_named, with_values
+    from dap3d_core.study import parameters_named, with_values
 
     found = parameters_named(dap.compile(scene).checked, names)
     values = [p.value * factor for p, factor in zip(found, factors, strict=True)]
@@ -38,12 +38,12 @@ def compared(model, names, factors, folder, t_end=0.3, **settings):
         ("pen1", ["bodies.cone.mass", "bodies.cone.Jp.y"]),
         ("quarter_car", ["bodies.chassis.mass", "bodies.upright.Jp.x"]),
         ("bodies2", None),
+        ("cradle", ["bodies.ball1.mass", "bodies.ball5.mass"]),  # contacts that events follow
     ],
 )
 def test_masses_and_inertias_give_the_bits_of_simulate(tmp_path, model, names):
     names = names or [f"bodies.{next(iter(dap.load(model).bodies))}.mass"]
-    found, expected = compared(model, names, [1.3, 1.1], tmp_path) if len(names) > 1 else compared(
-        model, names, [1.3], tmp_path)  # fmt: skip
+    found, expected = compared(model, names, [1.3, 1.1][: len(names)], tmp_path)
     np.testing.assert_array_equal(found, expected)
 
 

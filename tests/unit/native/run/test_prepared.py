@@ -162,6 +162,29 @@ def test_contacts_between_steps_with_inputs_and_saved_states(tmp_path):
                 assert run[name] == here.state[name]
 
 
+def test_drivers_beside_contacts_read_inputs(tmp_path):
+    """A ball on a plate that an input moves: it slips, sticks and rolls."""
+    scene = dap.Scene(name="plate")
+    scene.add_body("plate", mass=3.0, Jp=[0.1, 0.2, 0.2])
+    scene.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=[0, 0, 0.1])
+    scene.add_input("speed", value=0.0)
+    scene.add_joint("tran", "track", P_i="plate.O", P_j="ground.O", a_j="ground.x")
+    scene.add_joint("motor", "drive", joint="track", speed="speed")
+    scene.add_force("weight", "g")
+    ends = {"P_i": "ball.O", "P_j": "plate.O", "a_j": "plate.z"}
+    scene.add_contact("ball_plane", "touch", **ends, radius=0.1, mu=0.2)
+    names = ["plate.rd.x", "ball.r.x", "ball.rd.x", "ball.w.y", "work"]
+    _, library = exported(scene, tmp_path, outputs=names)
+    here, there = dap.start(scene, t_end=1.0), library.start(1.0)
+    for k in range(10):
+        speed = float(np.sin(0.8 * k))
+        here.step(0.1, inputs={"speed": speed})
+        there["speed"] = speed
+        there.step_to(here.t)
+        assert there.values(names).tolist() == [here.state[name] for name in names]
+    assert any(event.kind == "stick" for event in here.result().events)
+
+
 @pytest.mark.slow
 def test_friction_and_restitution_are_parameters(tmp_path):
     names = ["contacts.floor.mu", "contacts.floor.e"]

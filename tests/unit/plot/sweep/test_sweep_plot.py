@@ -7,6 +7,7 @@ import pytest
 import xarray
 from matplotlib import pyplot
 from matplotlib.collections import LineCollection, QuadMesh
+from support.internals import evenly
 
 import dap3d_core as dap
 from dap3d_core.plot import save_plot
@@ -14,7 +15,6 @@ from dap3d_core.plot.sweep.panels import Band, Heat, Lines, Scatter, Strands, ed
 from dap3d_core.plot.sweep.sweep_plot import Parallel, sweep_picture
 from dap3d_core.plot.sweep.sweep_table import Variable, table_of
 from dap3d_core.result import UnknownNameError
-from dap3d_core.study.sweep.dataset import evenly
 
 MASS, LENGTH, K = "bodies.bob.mass", "points.A.sPp.z", "forces.spring.k"
 T = np.linspace(0.0, 1.0, 5)

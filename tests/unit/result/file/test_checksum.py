@@ -7,11 +7,10 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray
+from support.internals import checksum
 from support.results import circling, grown, same_bits
 
 from dap3d_core.result import ResultError, open_result
-from dap3d_core.result.file import checksum
-from dap3d_core.result.file.checksum import check_checksums
 
 SIZE = 40
 REFUSED = r"cannot read .*: it is (damaged|cut off).*; take another copy of it, or run again$"
@@ -105,10 +104,10 @@ def test_a_growing_file_is_read_at_any_moment(tmp_path):
     result, _, _ = circling(nt=200)
     path = tmp_path / "run.nc.part"
     with closing(grown(tmp_path / "run.nc", result)) as writer:
-        check_checksums(path)
+        checksum.check_checksums(path)
         for first in range(0, 200, 50):
             writer.append(result.arrays.part(slice(first, first + 50)))
-            check_checksums(path)
+            checksum.check_checksums(path)
             shutil.copy(path, tmp_path / "copy.nc")
             assert len(open_result(tmp_path / "copy.nc").t) == first + 50
     assert same_bits(open_result(path), result)

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from support.internals import columns_of, dataset_to_write, names_of
+from support.internals import columns_of, dataset_to_write
 
 import dap3d_core as dap
 from dap3d_core.cli import main
-from dap3d_core.result import UnknownNameError
+from dap3d_core.result import UnknownNameError, names_of
 
 
 @pytest.fixture(scope="module")

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from support.internals import columns_of, jacobian_columns, selected, write_csv
 from support.results import circling, model_of, result_of
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError
-from dap3d_core.result.quantities.csv_table import columns_of, jacobian_columns, selected, write_csv
 
 
 def test_a_jacobian_of_many_rows_does_not_go_into_a_table(monkeypatch):

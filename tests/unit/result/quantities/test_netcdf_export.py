@@ -6,12 +6,11 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray
-from support.internals import columns_of, write_csv
+from support.internals import columns_of, dataset_to_write, selection_of, write_csv, write_netcdf
 from support.results import circling, model_of, result_of
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError
-from dap3d_core.result.quantities.netcdf_export import dataset_to_write, selection_of, write_netcdf
 
 
 def test_a_jacobian_of_many_rows_is_written_by_its_entries(tmp_path, monkeypatch):

@@ -4,15 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.internals import DEEPEST, LONGEST, WORDS, ExpressionError, parse_expression
 
 from dap3d_core import kernels
-from dap3d_core.scene.expressions.expression import (
-    DEEPEST,
-    LONGEST,
-    WORDS,
-    ExpressionError,
-    parse_expression,
-)
 
 T = np.linspace(0.1, 0.9, 5)
 A, B = np.arange(15.0).reshape(5, 3), np.ones((5, 3))

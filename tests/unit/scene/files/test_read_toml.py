@@ -3,9 +3,9 @@
 import os
 
 import pytest
+from support.internals import group_of
 
 import dap3d_core as dap
-from dap3d_core.scene.files.read_toml import group_of
 
 TEXT = '[scene]\nname = "small"\n\n[bodies.a]\nmass = 1.0\nJp = [1.0, 1.0, 1.0]\n'
 

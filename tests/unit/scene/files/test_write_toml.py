@@ -7,11 +7,10 @@ import attrs
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.internals import lines_of, scene_of
+from support.internals import Element, fault_of_name, lines_of, scene_of
 
 import dap3d_core as dap
 from dap3d_core.scene import check
-from dap3d_core.scene.tables import Element, fault_of_name
 
 import tomllib  # isort: skip
 

@@ -5,11 +5,11 @@ from importlib.metadata import version
 
 import numpy as np
 import pytest
+from support.internals import SYSTEM
 from unit.scene.base import BASE, mistakes_of, scene_of
 from unit.scene.mistakes import ALL
 
 import dap3d_core as dap
-from dap3d_core.result.quantities.catalogue import SYSTEM
 from dap3d_core.scene import MISSING, check, parse
 from dap3d_core.scene.signals import MOST_TERMS, SYSTEM_NAMES
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from support.internals import held_solution
 from support.plain import long_in_plain_python
 from unit.simulation.equilibrium.test_statics import hanging
 
 import dap3d_core as dap
-from dap3d_core.simulation.equilibrium.search import held_solution
 
 
 def stopped():

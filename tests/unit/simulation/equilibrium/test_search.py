@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-
-from dap3d_core.simulation.equilibrium.search import trust_region_step
+from support.internals import trust_region_step
 
 
 def test_a_short_step_is_newtons_also_without_symmetry():

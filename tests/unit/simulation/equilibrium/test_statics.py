@@ -11,14 +11,13 @@ from support.state_types import ZERO
 
 import dap3d_core as dap
 from dap3d_core.interface import Body, Force, body, number
-from dap3d_core.simulation.equilibrium.statics import Statics, displacement
-from dap3d_core.simulation.equilibrium.statics import at_rest as without_velocities
+from dap3d_core.simulation.equilibrium import statics as module
 
 
 def statics_of(scene):
     evaluator = dap.compile(scene).evaluator
     evaluator.start(0.0, evaluator.model.u0)
-    return Statics(evaluator), without_velocities(evaluator.model.u0)
+    return module.Statics(evaluator), module.at_rest(evaluator.model.u0)
 
 
 def test_positions_are_closed_to_rounding():
@@ -52,7 +51,7 @@ def test_displacements_are_found_back():
     """Of a retraction p + L^T dtheta / 2 the rotation is 2 atan(|dtheta| / 2)."""
     statics, u = statics_of(at_rest.toggle(0.7))
     x = np.random.default_rng(1).normal(size=18).reshape(3, 6)
-    shift, turn = displacement(u, statics.moved(u, x.ravel()))
+    shift, turn = module.displacement(u, statics.moved(u, x.ravel()))
     angle = np.linalg.norm(x[:, 3:], axis=1, keepdims=True)
     assert shift == pytest.approx(statics.length * x[:, :3], rel=1e-12)
     assert turn == pytest.approx(x[:, 3:] / angle * 2 * np.arctan(angle / 2), rel=1e-12)

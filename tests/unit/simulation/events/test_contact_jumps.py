@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from support.ended import leave, shorten_chunks
+from support.internals import contact_jumps
 from support.plain import long_in_plain_python
 from support.results import same_run
 
 import dap3d_core as dap
-from dap3d_core.simulation.events import contact_jumps
 
 
 def bouncing(e=0.5, mu=0.3, height=0.2, **more):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.internals import split
+from support.internals import redundancy, split
 from support.mechanisms import bent_chain, door, planar_four_bar, rough_four_bar, torn, two_motors
 from support.own_types import registry_of
 
@@ -11,14 +11,12 @@ from dap3d_core.interface import Function, Joint, Vector2, number, vector2
 from dap3d_core.kernels import cross, dot, neg, row, scale, sqrt, where
 from dap3d_core.result import Note
 from dap3d_core.simulation.initial import assemble, least_change
-from dap3d_core.simulation.initial.assemble import correct_initial, violation
-from dap3d_core.simulation.redundancy import redundancy
 
 
 def corrected(scene, **options):
     """A scene's machine and its corrected start."""
     evaluator = dap.compile(scene).evaluator
-    return evaluator, correct_initial(evaluator, evaluator.model.u0, **options)
+    return evaluator, assemble.correct_initial(evaluator, evaluator.model.u0, **options)
 
 
 @pytest.fixture
@@ -240,7 +238,7 @@ def test_corrected_velocities_are_the_least_change():
         u = evaluator.model.u0.copy()
         if seed is not None:
             u[21:] = np.random.default_rng(seed).normal(size=18)
-        found = correct_initial(evaluator, u)
+        found = assemble.correct_initial(evaluator, u)
         rows = evaluator.rows(0.0, found.u)
         D, v = rows.dense(), u[21:]
         wanted = v - np.linalg.pinv(D) @ (D @ v - rows.nu)
@@ -311,7 +309,7 @@ def test_without_correction_the_state_is_left_and_noted():
 def test_a_scene_without_joints_needs_no_correction():
     """Nothing is evaluated: no violation, no passes."""
     evaluator, found = corrected(dap.load("bodies2"))
-    assert violation(evaluator, evaluator.model.u0) == (0.0, 0.0)
+    assert assemble.violation(evaluator, evaluator.model.u0) == (0.0, 0.0)
     assert np.array_equal(found.u, evaluator.model.u0)
 
 

@@ -4,9 +4,9 @@ import shutil
 from types import SimpleNamespace
 
 import pytest
+from support.internals import free_space
 
 import dap3d_core as dap
-from dap3d_core.simulation.output import free_space
 
 
 @pytest.fixture

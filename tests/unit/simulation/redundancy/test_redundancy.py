@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.internals import correct_initial
+from support.internals import correct_initial, rank, redundancy
 from support.mechanisms import (
     bent_chain,
     bricard,
@@ -15,8 +15,6 @@ from support.mechanisms import (
 from support.plain import long_in_plain_python
 
 import dap3d_core as dap
-from dap3d_core.linear.rank import rank
-from dap3d_core.simulation.redundancy import redundancy
 from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from support import mechanisms, trees
-from support.internals import JP, change_over, scene_program
+from support.internals import JP, METRIC_CONSTANTS, change_over, scene_program
 from support.on_axles import driven, stone, wheel
 from support.plain import jit_is_on
 from support.state_types import stated
@@ -12,11 +12,9 @@ from unit.study.batch.test_batch import DONE, ensemble, path_of, singly
 from unit.study.batch.test_batch import pendulum as ball_pendulum
 
 import dap3d_core as dap
-from dap3d_core.assembly.metric import METRIC_CONSTANTS
 from dap3d_core.study import Ensemble
 from dap3d_core.study.batch import compiled_batch
 from dap3d_core.study.batch import lanes as study_lanes
-from dap3d_core.study.batch.lanes import LaneBatch
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="plain Python has no vectors")
 
@@ -27,7 +25,7 @@ RUN: list[int] = []
 @pytest.fixture(autouse=True)
 def at_once(monkeypatch):
     """Lanes for any number of points, also before their code is optimised, which has its bits."""
-    run = LaneBatch.run
+    run = study_lanes.LaneBatch.run
 
     def counted(lanes, points, budget):
         RUN.append(len(points.table))
@@ -40,8 +38,8 @@ def at_once(monkeypatch):
     monkeypatch.setattr(scene_program, "is_optimised", lambda evaluator: True)
     monkeypatch.setattr(compiled_batch, "BEFORE_LANES", 1)
     monkeypatch.setattr(study_lanes, "LEAST_COMPONENTS", 1)
-    monkeypatch.setattr(LaneBatch, "is_ready", True)
-    monkeypatch.setattr(LaneBatch, "run", counted)
+    monkeypatch.setattr(study_lanes.LaneBatch, "is_ready", True)
+    monkeypatch.setattr(study_lanes.LaneBatch, "run", counted)
 
 
 def branched():
@@ -275,7 +273,7 @@ def test_lanes_made_between_points_leave_the_numbers_of_the_scene():
     u[2] += 0.1
     evaluator.coordinates.start(u)
     before = evaluator.system.tree.constants.copy()
-    assert isinstance(runner.compiled_batch._lanes_for(), LaneBatch)
+    assert isinstance(runner.compiled_batch._lanes_for(), study_lanes.LaneBatch)
     assert np.array_equal(evaluator.system.tree.constants, before)
 
 

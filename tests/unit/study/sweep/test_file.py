@@ -8,16 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.internals import checksum, is_sweep
 from support.plain import long_in_plain_python
 from unit.result.file.test_checksum import REFUSED, SIZE, changed_files, no_library, written
 from unit.study.sweep.test_sweep import spring
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError
-from dap3d_core.result.file import checksum
-from dap3d_core.study.sweep import file
-from dap3d_core.study.sweep.dataset import is_sweep
-from dap3d_core.study.sweep.file import NOTE, boxes, note_letters
+from dap3d_core.study.sweep import file as sweep_file
 
 __all__ = ["no_library"]  # a fixture
 ASKED = {"vary": {"forces.spring.k": [1.0, 4.0]}, "outputs": "block.r.x", "t_end": 0.1}
@@ -42,7 +40,7 @@ def test_a_byte_changed_anywhere_is_refused(good, tmp_path, no_library):
 def test_of_a_large_file_the_beginning_is_compared(good, tmp_path, monkeypatch):
     """And of a small one all, whatever it says."""
     monkeypatch.setattr(checksum, "WHOLE", 1000)
-    monkeypatch.setattr("dap3d_core.study.sweep.file.WHOLE", 1000)
+    monkeypatch.setattr(sweep_file, "WHOLE", 1000)
     dap.sweep(spring(), **ASKED, output=tmp_path / "a.nc")
     assert dap.open_sweep(tmp_path / "a.nc").equals(dap.open_sweep(good))
     data = bytearray((tmp_path / "a.nc").read_bytes())
@@ -95,12 +93,12 @@ def test_what_a_reader_hindered_is_soon_written(tmp_path, monkeypatch):
     fcntl = pytest.importorskip("fcntl")
     path, found = tmp_path / "a.nc", []
     part = tmp_path / "a.nc.part"
-    monkeypatch.setattr(file, "EVERY", 0.0)
-    monkeypatch.setattr(file, "SOON", 0.0)
+    monkeypatch.setattr(sweep_file, "EVERY", 0.0)
+    monkeypatch.setattr(sweep_file, "SOON", 0.0)
 
     def progress(done, total):
         if not found:  # the file is there, and no point yet
-            monkeypatch.setattr(file, "EVERY", 1000.0)
+            monkeypatch.setattr(sweep_file, "EVERY", 1000.0)
             found.append(os.open(part, os.O_RDONLY))
             fcntl.flock(found[0], fcntl.LOCK_EX)
         elif len(found) == 1:
@@ -122,16 +120,16 @@ def test_boxes_cover_a_run_of_places_once_and_in_order(shape, data):
     first = data.draw(st.integers(0, len(whole)))
     last = data.draw(st.integers(first, len(whole)))
     found = []
-    for index, count in boxes(shape, first, last):
+    for index, count in sweep_file.boxes(shape, first, last):
         block = whole.reshape(shape)[index]
         assert block.size == count > 0
         found += block.ravel().tolist()
     assert found == list(range(first, last))
-    assert len(list(boxes(shape, first, last))) <= 2 * len(shape) - 1
+    assert len(list(sweep_file.boxes(shape, first, last))) <= 2 * len(shape) - 1
 
 
 def test_notes_are_cut_between_letters():
-    short, long = note_letters(np.array(["short", "ü" * NOTE], dtype=object))
+    short, long = sweep_file.note_letters(np.array(["short", "ü" * sweep_file.NOTE], dtype=object))
     assert short.tobytes().rstrip(b"\0") == b"short"
-    assert len(long) == NOTE
+    assert len(long) == sweep_file.NOTE
     assert long.tobytes().rstrip(b"\0").decode().endswith("ü ...")

@@ -15,7 +15,6 @@ from support.studies import POINTS, bob, collected, same
 import dap3d_core as dap
 from dap3d_core.study import Batch, Ensemble, PointStatus
 from dap3d_core.study.workers import threads as local
-from dap3d_core.study.workers.threads import ChunkSize, run_here
 
 POINTS_COUNT = 24 if jit_is_on() else 4
 
@@ -34,10 +33,10 @@ def ours():
 def test_numbers_depend_neither_on_threads_nor_on_portions(ensemble):
     """Bit for bit: one thread, more threads than cores, all points at once, each by itself."""
     points, places = POINTS[:POINTS_COUNT], np.arange(POINTS_COUNT)
-    one = collected(run_here(ensemble, points, places, threads=1))
+    one = collected(local.run_here(ensemble, points, places, threads=1))
     assert sorted(one) == list(range(POINTS_COUNT))
     for threads in (2, 3, None):
-        same(one, collected(run_here(ensemble, points, places, threads=threads)))
+        same(one, collected(local.run_here(ensemble, points, places, threads=threads)))
     same(one, collected([(places, ensemble.run(points))]))
     same(one, collected((places[k : k + 1], ensemble.run(points[k : k + 1])) for k in places))
     assert not ours()
@@ -46,11 +45,11 @@ def test_numbers_depend_neither_on_threads_nor_on_portions(ensemble):
 def test_only_the_given_points_are_run(ensemble):
     """In any order; none at all gives nothing."""
     points, places = POINTS[:9], np.array([7, 2, 5])
-    found = collected(run_here(ensemble, points, places, threads=2))
+    found = collected(local.run_here(ensemble, points, places, threads=2))
     assert sorted(found) == [2, 5, 7]
     for k in found:
         same({k: found[k]}, collected([(np.array([k]), ensemble.run(points[k : k + 1]))]))
-    assert list(run_here(ensemble, points, np.array([], dtype=int))) == []
+    assert list(local.run_here(ensemble, points, np.array([], dtype=int))) == []
 
 
 @attrs.define
@@ -73,14 +72,14 @@ class Slow:
 @pytest.mark.parametrize(("threads", "count"), [(1, 30), (8, 1)])
 def test_one_thread_or_one_point_makes_no_thread(threads, count):
     slow = Slow()
-    found = run_here(slow, POINTS[:count], np.arange(count), threads=threads)
+    found = local.run_here(slow, POINTS[:count], np.arange(count), threads=threads)
     assert len(collected(found)) == count
     assert {name for name, _ in slow.seen} == {threading.current_thread().name}
 
 
 def test_chunks_follow_the_time_of_earlier_ones():
     """A chunk of 1000 quick points is followed by one long one; the last ones are small."""
-    chunks = ChunkSize(0.2, 1)
+    chunks = local.ChunkSize(0.2, 1)
     for size in (1, 16, 256):
         assert chunks.next(10**6) <= size
         chunks.update(size, size * 1e-4)
@@ -96,7 +95,7 @@ def test_an_exception_comes_out_once_and_ends_the_others():
     """What was done before it is given; nobody works on afterwards."""
     points = np.column_stack([np.arange(200.0), np.zeros(200)])
     slow = Slow(0.002, fails_at=50.0)
-    found = run_here(slow, points, np.arange(200), threads=2)
+    found = local.run_here(slow, points, np.arange(200), threads=2)
     done = []
     with pytest.raises(ValueError, match="a function of the user"):
         done.extend(len(places) for places, _ in found)
@@ -111,7 +110,7 @@ def test_an_exception_comes_out_once_and_ends_the_others():
 @pytest.mark.parametrize("how", ["close", "Ctrl-C"])
 def test_an_early_end_leaves_the_rest(how):
     slow = Slow(0.01)
-    found = run_here(slow, np.zeros((500, 2)), np.arange(500), threads=2)
+    found = local.run_here(slow, np.zeros((500, 2)), np.arange(500), threads=2)
     next(found)
     if how == "close":
         found.close()
@@ -128,7 +127,7 @@ def test_an_early_end_does_not_wait_for_a_long_point(monkeypatch):
     """Its thread runs it to its end, begins no other one and does not keep the process alive."""
     monkeypatch.setattr(local, "PATIENCE", 0.01)
     slow = Slow(0.5)
-    found = run_here(slow, POINTS[:20], np.arange(20), threads=2)
+    found = local.run_here(slow, POINTS[:20], np.arange(20), threads=2)
     next(found)
     found.close()
     left, run = ours(), len(slow.seen)
@@ -144,17 +143,17 @@ def test_the_environment_limits_threads(monkeypatch):
     """DAP3D_THREADS, also of requested threads; invalid values are refused."""
     monkeypatch.setenv("DAP3D_THREADS", "1")
     slow = Slow()
-    collected(run_here(slow, POINTS[:8], np.arange(8), threads=4))
+    collected(local.run_here(slow, POINTS[:8], np.arange(8), threads=4))
     assert {name for name, _ in slow.seen} == {threading.current_thread().name}
     monkeypatch.setenv("DAP3D_THREADS", "none")
     with pytest.raises(dap.SimulationError, match="DAP3D_THREADS is 'none'; it must be a whole"):
-        run_here(slow, POINTS[:8], np.arange(8))
+        local.run_here(slow, POINTS[:8], np.arange(8))
 
 
 @pytest.mark.parametrize("threads", [0, -2, 1.5, "two", True])
 def test_what_is_no_number_of_threads_is_refused(ensemble, threads):
     with pytest.raises(dap.SceneError, match=r"threads = .*a whole number from 1"):
-        run_here(ensemble, POINTS[:2], np.arange(2), threads=threads)
+        local.run_here(ensemble, POINTS[:2], np.arange(2), threads=threads)
 
 
 @in_another_process

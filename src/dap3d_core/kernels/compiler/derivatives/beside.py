@@ -13,7 +13,7 @@ from dap3d_core.kernels.compiler.derivatives.instructions import (
     Instructions,
 )
 from dap3d_core.kernels.compiler.types import CompileError
-from dap3d_core.kernels.compiler.writer import DIFFERENTIATED, SLOPES, VALUES
+from dap3d_core.kernels.compiler.writer import COUNT, SLOPE, SLOPES, VALUES
 
 _NUMBER = re.compile(r"double ([^\s,)]+)")
 _BINARY = re.compile(r"f(add|sub|mul|div) double (\S+), (\S+)")
@@ -68,8 +68,8 @@ class BesideWriter(Instructions):
             )
         elif call := _CALL.fullmatch(text):
             self._call(name, text, *call.groups()[1:])
-        elif text.endswith(DIFFERENTIATED):
-            self.out.append(f"  {name} = or i1 true, true")
+        elif text.endswith(COUNT):
+            self.out.append(f"  {name} = add i64 {self.lanes}, 0")
         elif "double" not in text or _PLAIN.match(text):
             self.out.append(line)
         elif text.startswith("getelementptr "):
@@ -113,6 +113,10 @@ class BesideWriter(Instructions):
             of = [self._zero_or(word) for word in (a, b)]
             if remark == f" {SLOPES}":
                 self._keep(name, self._slopes.get(b))
+            elif remark and remark.startswith(f" {SLOPE} "):
+                place = f"i64 {remark.split()[-1]}"
+                line = f"  {name} = extractelement {self.vector} {of[1]}, {place}"
+                self.out[-1] = line
             elif of[0] != of[1]:
                 one, other = (f"{self.vector} {x}" for x in of)
                 self._keep(name, self.new(f"select i1 {condition}, {one}, {other}"))

@@ -8,12 +8,13 @@ import re
 
 from dap3d_core.kernels.compiler.derivatives.instructions import ONE, ZERO, Instructions
 from dap3d_core.kernels.compiler.lanes import CALL, NUMBER, VectorWriter
-from dap3d_core.kernels.compiler.writer import DIFFERENTIATED, SLOPES, VALUES
+from dap3d_core.kernels.compiler.writer import COUNT, SLOPE, SLOPES, VALUES
 
 _BINARY = re.compile(r"(fmul|fdiv) double (\S+), (\S+)")
 _COMPARED = re.compile(r"fcmp (\w+) double (\S+), (\S+)")
 _OPERANDS = re.compile(r"(?:f(?:add|sub|mul|div|neg)|select i1|call) .*double.*")
 _NAMED = re.compile(r"(?<=double )%[\w.]+|(?<=, )%[\w.]+")
+_ONE = re.compile(rf"select i1 true, double \S+, double (\S+) {SLOPE} (\S+)")
 _JOINED = re.compile(rf"select i1 true, double (\S+), double (\S+) {SLOPES}")
 
 
@@ -37,7 +38,7 @@ class WithinWriter(VectorWriter, Instructions):
 
     def special(self, name: str, text: str) -> list[str] | None:
         """As of ``VectorWriter``."""
-        if "double" not in text and not text.endswith((DIFFERENTIATED, VALUES)):
+        if "double" not in text and not text.endswith((COUNT, VALUES)):
             return None
         self.out, self._name, self._splats = [], name, {}
         return self.out if self._has_written(text) else None
@@ -58,8 +59,12 @@ class WithinWriter(VectorWriter, Instructions):
             self.out.append(f"  {self._name} = fcmp {relation} double {a}, {b}")
         elif found := _JOINED.fullmatch(text):
             self.out.append(self._join(self._word(found[1]), self._word(found[2])))
-        elif text.endswith(DIFFERENTIATED):
-            self.out.append(f"  {self._name} = or i1 true, true")
+        elif text.endswith(COUNT):
+            self.out.append(f"  {self._name} = add i64 {self.count - 1}, 0")
+        elif found := _ONE.fullmatch(text):
+            place = self.new(f"add i64 {found[2]}, 1")
+            of = f"{self.vector} {self._word(found[1])}, i64 {place}"
+            self._finish(self.new(f"extractelement {of}"))
         elif text.startswith("fptosi double "):
             value = self._value(text.split()[2])
             self.out.append(f"  {self._name} = fptosi double {value} to i64")
