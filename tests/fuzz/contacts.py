@@ -259,9 +259,11 @@ def check_other_way(scene, result, given):
     last = int(np.searchsorted(result.t, end, side="right")) - 1
     if last < 1:
         return
-    joint = given.get("method") != "joint" and not scene.joints
-    other = {"method": "joint", "integrator": "dop853"} if joint else {
-        "method": "lsq", "integrator": "radau" if given["integrator"] == "dop853" else "dop853"}  # fmt: skip
+    if given.get("method") != "joint" and not scene.joints:
+        other = {"method": "joint", "integrator": "dop853"}
+    else:
+        integrator = "radau" if given["integrator"] == "dop853" else "dop853"
+        other = {"method": "lsq", "integrator": integrator}
     again = dap.simulate(scene, **(given | other | {"t_end": float(result.t[last])}))
     size = 1.0 + np.max(np.abs(result.u[: last + 1]))
     assert np.max(np.abs(again.u - result.u[: last + 1])) <= SAME * size

@@ -269,9 +269,9 @@ def put_found(s: ContactArrays, begins: bool, inner: bool, loose: bool) -> bool:
 
 @compiled
 def hold_beside_slip(s: ContactArrays) -> bool:
-    """True if, of contacts that share, those that were found to slip do, and the others hold inside.
+    """True if, where those that were found to slip do, the others hold well within their cones.
 
-    At the end of a cone, which was a choice, rounding of the slip would end at once what holds.
+    Of contacts that share: at the end of a cone rounding of the slip would end at once what holds.
     """
     found = False
     for k in range(s.closed_count):

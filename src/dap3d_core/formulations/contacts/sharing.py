@@ -14,7 +14,7 @@ DEPENDENT = 1e-12
 #: rows take it, within what the cones leave.
 HELD, OF_REST, RATE_ROUNDING = 1e-9, 0.05, 1e-13
 #: Part of the largest force that is rounding of one.
-ROUNDING = 1e-12
+FORCE_ROUNDING = 1e-12
 #: How many parts of their cones within which contacts that share what they carry may be to stay,
 #: each leaving half of what the one before leaves: what they carry reaches its limit with so much
 #: left, 1e-9. And how many normal forces, each half of the one before.
@@ -150,7 +150,7 @@ def is_left_to_rows(s: ContactArrays, left: float) -> bool:
     for q in range(n):
         k = s.rows[q] // 3
         carried = s.mu_s[s.closed[k]] * pressing(s, k)
-        if carried > 0.0 and not abs(s.right[q]) <= OF_REST * left * carried + ROUNDING * big:
+        if carried > 0.0 and not abs(s.right[q]) <= OF_REST * left * carried + FORCE_ROUNDING * big:
             return False
     return True
 
