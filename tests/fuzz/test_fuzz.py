@@ -43,7 +43,8 @@ def test_more_inputs(name):
 
 @pytest.mark.every(4)
 @pytest.mark.parametrize("number", [1_000_014, 1357, 1477, 2021, 2184, 1_000_076,
-                                    1_048_577, 1_642_375, 1_159_636])  # fmt: skip
+                                    1_048_577, 1_159_636, 1_642_375,
+                                    1_650_876, 14_923_612])  # fmt: skip
 def test_contacts_that_once_ended_falsely(number):
     """As "ever faster", by steps as short as rounding, with a force that pulls, or overlapping."""
     assert check_contacts(str(number).encode()) == "done"

@@ -99,7 +99,7 @@ class Varied:
 
     def ball_on_ball(self, k, at):
         self.ball(k, at)
-        above = at + [0.1 * self.rng.random(), 0.1 * self.rng.random(), 0.0]
+        above = np.add(at, [0.1 * self.rng.random(), 0.1 * self.rng.random(), 0.0])
         above[2] = at[2] + 2 * RADIUS + self.height()
         self.body(f"a{k}", above, flat=False, Jp=[0.004] * 3)
         self.scene.add_contact("ball_ball", f"d{k}", P_i=f"a{k}.O", P_j=f"b{k}.O",
@@ -110,7 +110,7 @@ class Varied:
         self.body(f"b{k}", at, flat=True, Jp=[0.01, 0.015, 0.02])
         self.scene.add_contact("box_plane", f"c{k}", P_i=f"b{k}.O", size=SIZE.tolist(), a_j="n",
                                **self.law())  # fmt: skip
-        above = at + [0.25 * self.rng.normal(), 0.0, 0.05 + RADIUS + self.height()]
+        above = np.add(at, [0.25 * self.rng.normal(), 0.0, 0.05 + RADIUS + self.height()])
         self.body(f"a{k}", above, flat=False, Jp=[0.004] * 3)
         self.scene.add_contact("ball_box", f"d{k}", P_i=f"a{k}.O", P_j=f"b{k}.O", radius=RADIUS,
                                size=SIZE.tolist(), **self.law())  # fmt: skip
@@ -128,7 +128,9 @@ class Varied:
         scene.add_function("a", f"rises{k}", coeff=[0.0, speed, pull])
         scene.add_joint("drive-tran", f"drive{k}", P_i=f"s{k}.O", P_j=f"g{k}", a_j=f"u{k}",
                         function=f"rises{k}")  # fmt: skip
-        self.body(f"b{k}", at + [0.0, 0.0, RADIUS + self.height()], flat=True, Jp=[0.004] * 3)
+        self.body(
+            f"b{k}", np.add(at, [0.0, 0.0, RADIUS + self.height()]), flat=True, Jp=[0.004] * 3
+        )
         scene.add_contact("ball_plane", f"c{k}", P_i=f"b{k}.O", P_j=f"s{k}.O", a_j=f"n{k}",
                           radius=RADIUS, **self.law())  # fmt: skip
 
@@ -138,7 +140,7 @@ class Varied:
         height, half = float(self.rng.choice([0.1, 0.25])), 0.2
         rates = self.one_of(0.0, 3.0) * self.rng.normal(size=2)
         n, x, y = self.R[:, 2], self.R[:, 0], self.R[:, 1]
-        start = self.R @ (at + [0.0, 0.0, height + 0.05])
+        start = self.R @ np.add(at, [0.0, 0.0, height + 0.05])
         v = np.zeros(3)
         for i, name in enumerate((f"b{k}", f"a{k}")):
             v = v - rates[i] * half * n  # w x (half x), w = rate y
@@ -175,9 +177,10 @@ class Varied:
             if other == "ground":
                 r = np.asarray(self.scene.bodies[one].r) + self.rng.uniform(0.2, 0.6, size=3)
                 self.scene.add_point(f"eye{k}", "ground", r)
+            end = f"eye{k}" if other == "ground" else f"{other}.O"
             self.scene.add_force(
-                "ptp", f"spring{k}", P_i=f"{one}.O", P_j=f"eye{k}" if other == "ground" else f"{other}.O",
-                k=self.one_of(5.0, 50.0, 500.0), c=self.one_of(0.0, 0.0, 1.0), l0=self.one_of(0.0, 0.3),
+                "ptp", f"spring{k}", P_i=f"{one}.O", P_j=end, k=self.one_of(5.0, 50.0, 200.0),
+                c=self.one_of(0.0, 0.0, 1.0), l0=self.one_of(0.0, 0.3),
             )  # fmt: skip
 
 

@@ -245,11 +245,15 @@ def put_found(s: ContactArrays, begins: bool, inner: bool, loose: bool) -> bool:
         return False
     shares = do_share(s)
     holds = inner or (shares and not loose and hold_inside(s))
+    if not holds and not begin_to_move(s, LOOSE if loose else 1.0):
+        return False
+    if loose:
+        holds = hold_beside_slip(s)
+        if not holds and not (put_matrix(s, False) and begin_to_move(s, LOOSE)):
+            return False
     if holds:
         for k in range(3 * s.closed_count):
             s.cone.x[k], s.rates[k] = s.inner[k], 0.0
-    elif not begin_to_move(s, LOOSE if loose else 1.0):
-        return False
     largest, count = 0.0, 0
     for k in range(3 * s.closed_count):
         largest = max(largest, abs(s.cone.x[k]))
@@ -261,6 +265,26 @@ def put_found(s: ContactArrays, begins: bool, inner: bool, loose: bool) -> bool:
     if shares:
         leave_to_others(s)
     return True
+
+
+@compiled
+def hold_beside_slip(s: ContactArrays) -> bool:
+    """True if, where those that were found to slip do, the others hold well within their cones.
+
+    Of contacts that share: at the end of a cone rounding of the slip would end at once what holds.
+    """
+    found = False
+    for k in range(s.closed_count):
+        c, force = s.closed[k], s.cone.x[3 * k : 3 * k + 3]
+        slips = size_across(s, c, s.rates[3 * k : 3 * k + 3]) > 0.0
+        s.along_with[c], s.begins[c] = s.begins[c], slips and size_across(s, c, force) > 0.0
+        if s.begins[c] != 0:
+            put_slip_against(s, c, force, s.begin_way[c])
+            found = True
+    holds = found and put_matrix(s, True) and hold_inside(s)
+    for k in range(s.closed_count):
+        s.begins[s.closed[k]] = s.along_with[s.closed[k]]
+    return holds
 
 
 @compiled

@@ -13,6 +13,8 @@ DEPENDENT = 1e-12
 #: Part of the largest acceleration that may be left where contacts hold, by shares alone: their
 #: rows take it, within what the cones leave.
 HELD, OF_REST, RATE_ROUNDING = 1e-9, 0.05, 1e-13
+#: Part of the largest force that is rounding of one.
+FORCE_ROUNDING = 1e-12
 #: How many parts of their cones within which contacts that share what they carry may be to stay,
 #: each leaving half of what the one before leaves: what they carry reaches its limit with so much
 #: left, 1e-9. And how many normal forces, each half of the one before.
@@ -123,8 +125,33 @@ def are_held_within(s: ContactArrays, part: int, least: int, resisting: float = 
         rest = OF_REST * left * own * carried + RATE_ROUNDING * big
         if not abs(s.rates[s.rows[q]]) <= min(HELD * s.sizes[k], rest):
             return False
+    if not is_left_to_rows(s, left):
+        return False
     for k in range(3 * s.closed_count):
         s.inner[k] = x[k]
+    return True
+
+
+@compiled
+def is_left_to_rows(s: ContactArrays, left: float) -> bool:
+    """True if rows end what is left of rates by little of what the cones leave.
+
+    Of weak rows that is more force than their own mobility tells.
+    """
+    n, A, big = put_own_rows(s), s.cone.A, 0.0
+    for i in range(n):
+        s.x[i] = s.rates[s.rows[i]]
+        for k in range(n):
+            s.B[i, k] = A[s.rows[i], s.rows[k]]
+    rank = factor_least(s.B, n, n, DEPENDENT, 0.0, s.w, s.order)
+    solve_least(s.B, n, n, rank, s.w, s.order, s.x, s.right)
+    for k in range(3 * s.closed_count):
+        big = max(big, abs(s.cone.x[k]))
+    for q in range(n):
+        k = s.rows[q] // 3
+        carried = s.mu_s[s.closed[k]] * pressing(s, k)
+        if carried > 0.0 and not abs(s.right[q]) <= OF_REST * left * carried + FORCE_ROUNDING * big:
+            return False
     return True
 
 
