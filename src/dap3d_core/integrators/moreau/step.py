@@ -20,8 +20,10 @@ from dap3d_core.integrators.moreau.contact_set import (
 from dap3d_core.integrators.moreau.free_motion import (
     follow_states,
     largest_rate,
+    move,
     move_freely,
     normalise,
+    take_velocities,
 )
 from dap3d_core.integrators.moreau.impulses import (
     forget,
@@ -283,17 +285,6 @@ def keep_pushed(work: Any, s: StepArrays) -> None:
 
 
 @compiled
-def take_velocities(y: Floats, n: int, v: Floats) -> None:
-    """Put the velocities of an integrated state, in global axes."""
-    for b in range(1, n + 1):
-        f, p = velocity_offset(b, n), y[coordinate_offset(b) :]
-        for k in range(3):
-            v[b, k] = y[f + k]
-            a, c, d = axes_of(p, k)
-            v[b, 3 + k] = a * y[f + 3] + c * y[f + 4] + d * y[f + 5]
-
-
-@compiled
 def put_margins(s: StepArrays) -> None:
     """How near bodies have to be, m, to touch within the step."""
     least = LEAST_MARGIN * s.length
@@ -421,22 +412,6 @@ def work_done(work: Any, s: StepArrays) -> float:
     for k in range(s.y.size):
         total += s.y[k] * speed_of(s, k, s.trial)
     return total
-
-
-@compiled
-def move(y: Floats, c: int, dx: float, dy: float, dz: float, a: float, b: float, d: float) -> None:
-    """Move and turn the body at c by (dx, dy, dz), m, and (a, b, d), rad, in global axes."""
-    y[c], y[c + 1], y[c + 2] = y[c] + dx, y[c + 1] + dy, y[c + 2] + dz
-    half = 0.5 * math.sqrt(a * a + b * b + d * d)
-    part = 0.5 * (math.sin(half) / half if half > 0.0 else 1.0)
-    a, b, d, f = part * a, part * b, part * d, math.cos(half)
-    e0, e1, e2, e3 = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
-    p0 = f * e0 - (a * e1 + b * e2 + d * e3)
-    p1 = f * e1 + a * e0 + (b * e3 - d * e2)
-    p2 = f * e2 + b * e0 + (d * e1 - a * e3)
-    p3 = f * e3 + d * e0 + (a * e2 - b * e1)
-    size = math.sqrt(p0 * p0 + p1 * p1 + p2 * p2 + p3 * p3)
-    y[c + 3], y[c + 4], y[c + 5], y[c + 6] = p0 / size, p1 / size, p2 / size, p3 / size
 
 
 @compiled
