@@ -359,7 +359,7 @@ def find_slopes(
     start, as of a uniform motion; derivatives follow at the rate of the tangent, which lacks what
     sliding does to the force that it depends on.
     """
-    Z, R, found, changes = work.Z, work.R, work.multipliers, work.G
+    stages, moves, found, changes = work.Z, work.R, work.multipliers, work.G
     before = LARGEST
     for done in range(MOST_OF_SLOPES):
         evaluate(t, h, work, system, loops, tangent, matrix)
@@ -367,8 +367,8 @@ def find_slopes(
         work.rhs_count -= work.stages
         change = change_of_slopes(work)
         for i in range(work.stages):
-            for k in range(Z.shape[1]):
-                Z[i, k] = with_slopes(Z[i, k], Z[i, k] + R[i, k])
+            for k in range(stages.shape[1]):
+                stages[i, k] = with_slopes(stages[i, k], stages[i, k] + moves[i, k])
             for r in range(2):
                 for k in range(found.shape[2]):
                     found[i, r, k] = with_slopes(found[i, r, k], found[i, r, k] + changes[i, r, k])

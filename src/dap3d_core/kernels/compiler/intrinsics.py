@@ -105,7 +105,7 @@ def _values_alone(w: Writer, node: ast.Call, values: list[t.Value]) -> t.Value:
 
 
 def _slope(w: Writer, node: ast.Call, values: list[t.Value]) -> t.Value:
-    x, k = (w.cast(node, value, kind).word for value, kind in zip(values, (t.FLOAT, t.INT)))
+    x, k = w.cast(node, values[0], t.FLOAT).word, w.cast(node, values[1], t.INT).word
     zero = t.constant(0.0).word
     return w.emit(t.FLOAT, f"select i1 true, double {zero}, double {x} {SLOPE} {k}")
 
