@@ -53,6 +53,6 @@ def test_force_of_a_muscle_by_its_acceleration(tmp_path):
 
 
 def test_points_of_a_tendon_in_one_place_are_refused(tmp_path):
-    text = BALLS.replace('pos="0 0 1"', 'pos="0 0 2"')
-    with pytest.raises(dap.SceneError, match="tendon own: two points that follow each other"):
+    text = BALLS.replace('"top" pos="0 0 2"', '"top" pos="0 0 0"')
+    with pytest.raises(dap.SceneError, match="tendon rope0: two points that follow each other"):
         imported(tmp_path / "a.xml", text)

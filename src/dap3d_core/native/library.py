@@ -23,7 +23,7 @@ from dap3d_core.simulation import SimulationError
 
 OK, ENDED = 0, 1
 #: Functions of dap3d.h: result, name, arguments; what they are of, where they are no pointers.
-DECLARED = re.compile(r"DAP3D_API ([\w *]+?)(dap3d_\w+)\((.*?)\);", re.DOTALL)
+DECLARED = re.compile(r"\w+_API ([\w *]+?)(dap3d_\w+)\((.*?)\);", re.DOTALL)
 TYPES: dict[str, Any] = {
     "void": None, "int": ctypes.c_int, "double": ctypes.c_double, "size_t": ctypes.c_size_t,
     "const char *": ctypes.c_char_p,

@@ -15,14 +15,14 @@ G = 9.81
 GIVEN = {"t_end": 0.4, "dt": 0.1, "contact_step": 5e-3}
 
 
-def stack():
+def stack(apart=1.0):
     """A ball of 1 kg in a pit above two of 2 kg side by side, which slide apart on a floor."""
     scene = dap.Scene(name="stack")
     scene.add_material("surface", mu=0.1)
     scene.add_collisions(material="surface")
     for name, mass, r in (("a", 2.0, [-0.1, 0, 0.1]), ("b", 2.0, [0.1, 0, 0.1]),
                           ("top", 1.0, [0.0, 0, 0.1 + 0.1 * 3**0.5])):  # fmt: skip
-        scene.add_body(name, mass=mass, Jp=[0.004 * mass] * 3, r=r)
+        scene.add_body(name, mass=mass, Jp=[0.004 * mass] * 3, r=[apart * x for x in r])
         scene.add_shape("sphere", body=name, name=f"{name}_ball", radius=0.1, collides=True)
     scene.add_shape("plane", "floor", body="ground", collides=True)
     scene.add_force("weight", "gravity")
@@ -47,9 +47,8 @@ def test_forces_are_the_momentum_that_bodies_gain(result):
 
 def test_a_pair_is_seen_from_either_shape(result):
     one, other = result.contacts.of("a_ball", "floor"), result.contacts.of("floor", "a_ball")
-    assert len(one) == 4
-    assert one.t.tolist() == result.t[1:].tolist()
-    assert one.normal == pytest.approx(np.tile([0.0, 0.0, 1.0], (4, 1)))
+    assert one.t.tolist() == result.t.tolist()
+    assert one.normal == pytest.approx(np.tile([0.0, 0.0, 1.0], (5, 1)))
     assert other.force.tolist() == (-one.force).tolist()
     assert {one.names[i] for i in one.pair[:, 0]} == {"a_ball"}
     assert one.point[:, 2] == pytest.approx(0.0, abs=1e-12)
@@ -64,8 +63,7 @@ def test_a_file_has_the_table(result, tmp_path):
     data = found.contacts.to_xarray()
     assert set(data.data_vars) == set(FIELDS)
     assert str(data.shapes.values[0, 1]) in found.contacts.names
-    none = dap.simulate(stack(), t_end=1e-3, dt=1e-3, contact="stepping", contact_step=1e-3)
-    none.at([0]).save(tmp_path / "none.nc")
+    dap.simulate(stack(10.0), **GIVEN).save(tmp_path / "none.nc")
     assert len(dap.open(tmp_path / "none.nc").contacts) == 0
 
 
@@ -79,8 +77,7 @@ def test_a_page_has_an_arrow_for_each_pair(result):
     arrows = page_data(result, stack(), [], None)["arrows"]
     (floor,) = [a for a in arrows if set(a["name"].split(" on ")) == {"floor", "a_ball"}]
     values = np.frombuffer(base64.b64decode(floor["values"]), dtype="<f4").reshape(-1, 3)
-    assert values[1:] == pytest.approx(result.contacts.of("a_ball", "floor").force, rel=1e-6)
-    assert not values[0].any()
+    assert values == pytest.approx(result.contacts.of("a_ball", "floor").force, rel=1e-6)
 
 
 def sliding():
@@ -123,7 +120,7 @@ def test_shapes_and_declared_contacts_are_in_one_table():
     scene.add_contact("ball_plane", "ground_floor", P_i="ball.O", radius=0.1, mu=0.3)
     result = dap.simulate(scene, **GIVEN)
     own, shapes = result.contacts.of("ball", "ground"), result.contacts.of("floor")
-    assert own.force == pytest.approx(np.tile([0.0, 0.0, 2.0 * G], (4, 1)), abs=1e-9)
-    assert len(result.contacts.of("a_ball", "floor")) == 4
+    assert own.force == pytest.approx(np.tile([0.0, 0.0, 2.0 * G], (5, 1)), abs=1e-9)
+    assert len(result.contacts.of("a_ball", "floor")) == 5
     assert np.all(np.diff(result.contacts.t) >= 0.0)
     assert len(own) + len(shapes) + len(result.contacts.of("top_ball")) == len(result.contacts)
