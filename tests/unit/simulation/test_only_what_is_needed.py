@@ -155,7 +155,7 @@ def test_lanes_are_imported_by_long_studies():
     script += (
         "sweep('joint')\n"
         "sweep('standard')\n"
-        f"assert not {names} & set(sys.modules)\n"
+        "assert 'dap3d_core.study.batch.lanes' not in sys.modules\n"  # derivatives bring the other
         "compiled_batch.BEFORE_LANES = 1\n"
         "sweep('standard')\n"
     )
