@@ -215,11 +215,17 @@ def find_low(s: ContactArrays) -> bool:
 
 @compiled
 def hold_low(s: ContactArrays, system: System) -> None:
-    """Stop the contacts of role 1 so that none of role 2 approaches."""
+    """Stop the contacts of role 1 so that none of role 2 approaches; count the work of that."""
     for c in range(s.state.shape[0]):
         s.values[c], s.least[c] = s.closing[c], 0.0
-    lift(s)
+    count = lift(s)
+    for k in range(count):
+        c = s.active[k]
+        s.work[c] += 0.5 * s.inner[k] * (s.slip[c, 0] - s.driven[c, 0])
     change(s, system)
+    for k in range(count):
+        c = s.active[k]
+        s.work[c] += 0.5 * s.inner[k] * (s.slip[c, 0] - s.driven[c, 0])
 
 
 @compiled
