@@ -26,7 +26,7 @@ AT_REST = 1e-9
 #: Rounds of one instant; in the last one all that touches stops.
 ROUNDS = 500
 #: Height of a bounce, as a part of the length of the scene, from which on what bounces is held:
-#: those that would follow end after the geometric series of their times, too near to tell from rest.
+#: those that follow end after the geometric series of their times, too near to tell from rest.
 LAST_HEIGHT = 1e-13
 
 
