@@ -44,9 +44,14 @@ def test_more_inputs(name):
 @pytest.mark.every(4)
 @pytest.mark.parametrize("number", [1_000_014, 1357, 1477, 2021, 2184, 1_000_076,
                                     1_048_577, 1_159_636, 1_642_375,
-                                    1_650_876, 14_923_612])  # fmt: skip
+                                    1_650_876, 14_923_612, 10_445_297, 11_594_543, 18_897_519,
+                                    8_897_954, 13_400_462, 21_657_220, 25_366_246, 8_355_428,
+                                    25_901_617, 28_577_788, 13_822_892])  # fmt: skip
 def test_contacts_that_once_ended_falsely(number):
-    """As "ever faster", by steps as short as rounding, with a force that pulls, or overlapping."""
+    """As "ever faster", by steps as short as rounding, with a force that pulls, or overlapping.
+
+    Or by bounces without an end on what stands, or a tangent that stayed no number.
+    """
     assert check_contacts(str(number).encode()) == "done"
 
 

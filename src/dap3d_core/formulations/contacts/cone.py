@@ -186,6 +186,8 @@ def residual_of(c: Cone, A: Floats, b: Floats, x: Floats, derives: bool) -> None
             z1 -= r[j] * A[k + 1, q] * x[q]
             z2 -= r[j] * A[k + 2, q] * x[q]
         is_free = free[j] != 0.0
+        if A[k, k] == 0.0 and not is_free:
+            z0 = 0.0  # friction of a joint has no normal
         u = c.under[j]
         pressing = more[j] if is_free else x[3 * u] + more[u]
         first = z0 if is_free else 0.0
@@ -228,6 +230,7 @@ def sweep(c: Cone, A: Floats, b: Floats, x: Floats, sweeps: int) -> None:
                 u2 += A[k + 2, q] * x[q]
             is_free = free[j] != 0.0
             n = x[k] if is_free else max(0.0, x[k] - u0 / max(A[k, k], TINY))
+            n = n if is_free or A[k, k] != 0.0 else 0.0
             u1 += A[k + 1, k] * (n - x[k])
             u2 += A[k + 2, k] * (n - x[k])
             z1, z2 = x[k + 1] - r[j] * u1, x[k + 2] - r[j] * u2

@@ -161,7 +161,6 @@ class ContactArrays(Arrays):
     rests_soon: Integers  # 1 of those whose bounces end, and how long these take, s
     rest_time: Floats
     is_low: Integers  # 1 of those that are held, as they would be back at once
-    e_left: Floats  # restitution of those that still bounce, and in a round
     e_now: Floats
     taking: Integers  # (rounds, m) 1 of those that take part, with restitution; -1: slip is stopped
     restitution: Floats
@@ -207,7 +206,7 @@ WHOLE = (
     "in_touch", "stops", "opening", "is_low", "rests_soon", "role", "is_active", "active",
 )  # fmt: skip
 NUMBERS = (
-    "load", "mode", "sizes", "closing", "limit", "was", "work", "rest_time", "e_left", "e_now",
+    "load", "mode", "sizes", "closing", "limit", "was", "work", "rest_time", "e_now",
     "values", "least",
 )  # fmt: skip
 DIRECTIONS = (

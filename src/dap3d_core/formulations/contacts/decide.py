@@ -22,7 +22,14 @@ from dap3d_core.formulations.contacts.contact_table import (
     put_outputs,
 )
 from dap3d_core.formulations.contacts.forces import put_slip_against, size_across
-from dap3d_core.formulations.contacts.impacts import AT_REST, collide, repeat_rounds, unjam
+from dap3d_core.formulations.contacts.impacts import (
+    AT_REST,
+    collide,
+    find_low,
+    hold_low,
+    repeat_rounds,
+    unjam,
+)
 from dap3d_core.formulations.contacts.loads import find_modes
 from dap3d_core.formulations.contacts.modes import is_pressed
 from dap3d_core.formulations.contacts.rows import (
@@ -85,13 +92,13 @@ def decide(
     if not leave_movable(t, s, system, loops, functions):
         return PRESCRIBED
     put_opening(s)
-    collide(t, s, system, loops, functions)
+    collide(s, system)
     move_on(t, s, system, loops)
     find_grips(t, s, system, tensions)
     if s.jammed >= 0:
         for c in range(s.jams.shape[0]):
             s.jams[c] = c == s.jammed
-    if s.jammed >= 0 or not find_modes_now(t, s, system, loops, functions):
+    if s.jammed >= 0 or not find_lasting(t, s, system, loops, functions, tensions):
         if not unjam(s, system):
             return blame(s)
         s.freed += 1
@@ -99,7 +106,7 @@ def decide(
         find_grips(t, s, system, tensions)
         for c in range(s.begins.shape[0]):
             s.begins[c] = s.leaves[c] = 0
-        if not find_modes_now(t, s, system, loops, functions):
+        if not find_lasting(t, s, system, loops, functions, tensions):
             return blame(s)
     settle(s, system)
     put_state(s, system)
@@ -284,6 +291,20 @@ def put_opening(s: ContactArrays) -> None:
     for c in range(s.state.shape[0]):
         has_ended = s.ended[c, 0] != 0 or s.ended[c, 1] != 0
         s.opening[c] = has_ended and s.was[c] < 0.5 and s.closing[c] > 0.0
+
+
+@compiled
+def find_lasting(
+    t: float, s: ContactArrays, system: System, loops: Any, functions: Any, tensions: Any
+) -> bool:
+    """The modes of contacts in touch once what would be back at once is held; False if they jam."""
+    while find_modes_now(t, s, system, loops, functions):
+        if not find_low(s):
+            return True
+        hold_low(s, system)
+        move_on(t, s, system, loops)
+        find_grips(t, s, system, tensions)
+    return False
 
 
 @compiled

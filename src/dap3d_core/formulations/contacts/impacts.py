@@ -10,13 +10,11 @@ touch, as through Newton's cradle. Where e is zero everywhere one round of all t
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
-from typing import Any
-
 from dap3d_core.assembly.arrays import System
 from dap3d_core.formulations.contacts.cone import TRIES, solve_cone
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.contacts.forces import UNSOLVED, put_plain
-from dap3d_core.formulations.contacts.rows import change, kick, lift, put_free
+from dap3d_core.formulations.contacts.rows import change, kick, lift
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.least_squares import factor_least, solve_least
@@ -27,8 +25,8 @@ DEPENDENT = 1e-12
 AT_REST = 1e-9
 #: Rounds of one instant; in the last one all that touches stops.
 ROUNDS = 500
-#: Height of a bounce, as a part of the length of the scene, from which on those that would follow
-#: are summed: they end after the geometric series of their times, too near to be told from rest.
+#: Height of a bounce, as a part of the length of the scene, from which on what bounces is held:
+#: those that follow end after the geometric series of their times, too near to tell from rest.
 LAST_HEIGHT = 1e-13
 
 
@@ -98,21 +96,21 @@ def stop_slip(s: ContactArrays) -> bool:
 
 
 @compiled
-def collide(t: float, s: ContactArrays, system: System, loops: Any, functions: Any) -> None:
+def collide(s: ContactArrays, system: System) -> None:
     """Let the contacts in touch collide until none approaches; velocities follow."""
     s.round_count, s.exchanged = 0, 0.0
     for c in range(s.state.shape[0]):
-        s.e_left[c], s.work[c], s.rests_soon[c] = s.e[c], 0.0, 0
+        s.work[c], s.rests_soon[c], s.is_low[c], s.role[c] = 0.0, 0, 0, 0
         for i in range(3):
             s.impulses[c, i] = 0.0
     for k in range(ROUNDS):
         if not take_part(s, k == ROUNDS - 1):
             break
         put_impulses(s, s.e_now)
-        if not end_bounces(t, s, system, loops, functions):
-            remember_round(s)
-            act(s, system)
-    stop_low_rocking(t, s, system, loops, functions)
+        remember_round(s)
+        act(s, system)
+    for k in range(s.in_touch_count):
+        s.role[s.in_touch[k]] = 2
 
 
 @compiled
@@ -121,7 +119,7 @@ def take_part(s: ContactArrays, is_last: bool) -> bool:
     s.touching_count, bounces = 0, False
     for k in range(s.in_touch_count):
         c = s.in_touch[k]
-        bounces |= s.e_left[c] > 0.0
+        bounces |= s.e[c] > 0.0
         presses = s.under[c] if s.under[c] >= 0 else c
         if s.closing[presses] < -AT_REST * s.length[presses]:
             s.touching[s.touching_count] = c
@@ -131,34 +129,8 @@ def take_part(s: ContactArrays, is_last: bool) -> bool:
             s.touching[k] = s.in_touch[k]
         s.touching_count = s.in_touch_count
     for c in range(s.state.shape[0]):
-        s.e_now[c] = 0.0 if is_last else s.e_left[c]
+        s.e_now[c] = 0.0 if is_last else s.e[c]
     return s.touching_count > 0
-
-
-@compiled
-def end_bounces(t: float, s: ContactArrays, system: System, loops: Any, functions: Any) -> bool:
-    """Let contacts whose bounces would be too low from here on bounce no more; True if some do.
-
-    The speeds after bounces are v, e v, e^2 v, ...: how long that takes is the sum of a series.
-    """
-    found = False
-    for k in range(s.touching_count):
-        c = s.touching[k]
-        if not (s.e_left[c] > 0.0 and s.slip[c, 0] < 0.0):
-            continue  # it is at rest
-        put_free(t, s, system, loops, functions)
-        v, a = s.slip[c, 0], -s.free[3 * c]
-        for q in range(s.touching_count):
-            for i in range(3):
-                v += s.W[3 * c, 3 * s.touching[q] + i] * s.x[3 * q + i]
-        is_low = a > 0.0 and v * v > 0.0 and v * v < 2.0 * a * LAST_HEIGHT * s.length[c]
-        if is_low and s.e_left[c] < 1.0:
-            s.rest_time[c] = 2.0 * v / (a * (1.0 - s.e_left[c]))
-            s.rests_soon[c], found = 2, True
-    for c in range(s.state.shape[0]):
-        if s.rests_soon[c] == 2:
-            s.e_left[c], s.rests_soon[c] = 0.0, 1
-    return found
 
 
 @compiled
@@ -218,42 +190,42 @@ def unjam(s: ContactArrays, system: System) -> bool:
 
 
 @compiled
-def stop_low_rocking(
-    t: float, s: ContactArrays, system: System, loops: Any, functions: Any
-) -> None:
-    """Hold what would be back from a height too low to tell from rest, as of rocking.
+def find_low(s: ContactArrays) -> bool:
+    """Give role 1 to open contacts that come back from too low, of role 2; False if none does.
 
+    It is known what carries the others: of a ball on a box that stands, both would fall alike else.
     What is held may lift others as low: they would change places for ever.
     """
-    for c in range(s.state.shape[0]):
-        s.is_low[c] = s.role[c] = 0
-    for k in range(s.in_touch_count):
-        s.role[s.in_touch[k]] = 2
-    while find_low(t, s, system, loops, functions):
-        hold_low(s, system)
-
-
-@compiled
-def find_low(t: float, s: ContactArrays, system: System, loops: Any, functions: Any) -> bool:
-    """Give role 1 to what comes back from too low, of role 2; False if nothing does."""
-    found = False
+    found, n = False, s.free.shape[0]
     for k in range(s.in_touch_count):
         c = s.in_touch[k]
         v = s.closing[c]
-        if s.role[c] == 2 and v > AT_REST * s.length[c]:
-            put_free(t, s, system, loops, functions)
-            if v * v < -2.0 * LAST_HEIGHT * s.length[c] * s.free[3 * c]:
-                s.is_low[c], s.role[c], found = 1, 1, True
+        if not (s.role[c] == 2 and s.mode[c] == 0.0 and v > AT_REST * s.length[c]):
+            continue
+        a = -s.free[3 * c]
+        for q in range(n):
+            a -= s.W[3 * c, q] * s.force[q // 3, q % 3]
+        if v * v < 2.0 * LAST_HEIGHT * s.length[c] * a:
+            s.is_low[c], s.role[c], found = 1, 1, True
+            if s.impulses[c, 0] > 0.0 and 0.0 < s.e[c] < 1.0:
+                # the speeds after bounces are v, e v, e^2 v, ...: that takes the sum of a series
+                s.rests_soon[c], s.rest_time[c] = 1, 2.0 * v / (a * (1.0 - s.e[c]))
     return found
 
 
 @compiled
 def hold_low(s: ContactArrays, system: System) -> None:
-    """Stop the contacts of role 1 so that none of role 2 approaches."""
+    """Stop the contacts of role 1 so that none of role 2 approaches; count the work of that."""
     for c in range(s.state.shape[0]):
         s.values[c], s.least[c] = s.closing[c], 0.0
-    lift(s)
+    count = lift(s)
+    for k in range(count):
+        c = s.active[k]
+        s.work[c] += 0.5 * s.inner[k] * (s.slip[c, 0] - s.driven[c, 0])
     change(s, system)
+    for k in range(count):
+        c = s.active[k]
+        s.work[c] += 0.5 * s.inner[k] * (s.slip[c, 0] - s.driven[c, 0])
 
 
 @compiled

@@ -272,11 +272,11 @@ def unscale(s: ContactArrays, system: System) -> None:
 
 
 @compiled
-def lift(s: ContactArrays) -> None:
+def lift(s: ContactArrays) -> int:
     """Put into ``push`` the least change, with the joints held, that lifts contacts.
 
     It brings ``values``, gaps or their rates, to zero where ``role`` is 1, and lets none be less
-    than ``least`` where it is 2.
+    than ``least`` where it is 2. Returns how many are ``active``, by impulses ``inner``.
     """
     count, more = 0, True
     for c in range(s.state.shape[0]):
@@ -302,6 +302,7 @@ def lift(s: ContactArrays) -> None:
                     count += 1
     for k in range(count):
         add_scaled(s.inner[k], s.moves[3 * s.active[k]], s.push)
+    return count
 
 
 @compiled

@@ -157,56 +157,104 @@ def is_left_to_rows(s: ContactArrays, left: float) -> bool:
 
 @compiled
 def leave_to_others(s: ContactArrays) -> None:
-    """Let rows of friction alone not hold where others, and the joints, hold what they would.
+    """Let rows of friction not hold where others, and the joints, hold what they would.
 
     They carry what was found for them; joints and rows would divide that between them otherwise.
     """
-    count, left = 0, 0
+    count = 0
     for k in range(s.closed_count):
         c = s.closed[k]
-        for i in range(3):
-            holds = s.mode[c] > (0.5 if i == 0 else 1.5)
-            if s.alone[c] == 0 and holds:
-                s.rows[count] = 3 * c + i
-                count += 1
-            elif s.alone[c] != 0 and s.mode[c] == 2.0 and s.holds[c, i] != 0:
-                s.way[c, i] = 1.0  # until it is found to hold
-                left += 1
-    least = DEPENDENT * largest_entry(s.W, s.W.shape[0])
-    while left > 0:
-        rank = factor_rows(s, count)
-        best, most = -1, least
-        for k in range(s.closed_count):
-            c = s.closed[k]
-            for i in range(3 if s.alone[c] != 0 and s.mode[c] == 2.0 else 0):
-                if s.holds[c, i] != 0 and s.way[c, i] == 1.0:
-                    free = freedom_of(s, 3 * c + i, count, rank)
-                    if free > most:
-                        best, most = 3 * c + i, free
-        if best < 0:
-            return
-        s.rows[count] = best
-        s.way[best // 3, best % 3] = 0.0
-        count += 1
-        left -= 1
+        if s.alone[c] == 0 and s.mode[c] > 0.5:
+            s.rows[count] = 3 * c
+            count += 1
+    hold_freest(s, hold_freest(s, count, 0), 1)
 
 
 @compiled
-def factor_rows(s: ContactArrays, count: int) -> int:
+def hold_freest(s: ContactArrays, count: int, alone: int) -> int:
+    """Let rows of friction hold, the freest first, and others not, until these are found to.
+
+    Tangents of contacts hold as well where without joints they depend on each other: they share.
+
+    Args:
+        s: with the first rows, ``count`` of them, that hold.
+        alone: 1 of friction of joints alone, 0 of contacts.
+
+    Returns:
+        How many rows hold then.
+    """
+    left, least = 0, DEPENDENT * largest_entry(s.W, s.W.shape[0])
+    for k in range(s.closed_count):
+        c = s.closed[k]
+        for i in range(1 - alone, 3 if is_left(s, c, alone) else 0):
+            s.way[c, i] = s.holds[c, i]
+            left += s.holds[c, i]
+    best = 0
+    while left > 0 and best >= 0:
+        rank, best = factor_rows(s, count, True), -1
+        most = least
+        for k in range(s.closed_count):
+            c = s.closed[k]
+            for i in range(3 if is_left(s, c, alone) else 0):
+                if s.way[c, i] == 1.0:
+                    free = freedom_of(s, 3 * c + i, count, rank, True)
+                    if free > most:
+                        best, most = 3 * c + i, free
+        if best >= 0:
+            count, left = hold_row(s, best, count), left - 1
+    if left == 0 or alone != 0:
+        return count
+    of_bodies, rank = count, factor_rows(s, count, False)
+    for k in range(s.closed_count):
+        c = s.closed[k]
+        for i in range(3 if is_left(s, c, alone) else 0):
+            row = 3 * c + i
+            small = DEPENDENT * mobility(s, row, row, False)
+            if s.way[c, i] == 1.0 and freedom_of(s, row, of_bodies, rank, False) <= small:
+                count = hold_row(s, row, count)
+    return count
+
+
+@compiled
+def is_left(s: ContactArrays, c: int, alone: int) -> bool:
+    """True of a contact that sticks, of friction of joints alone or of others."""
+    return (s.alone[c] == alone) & (s.mode[c] == 2.0)
+
+
+@compiled
+def hold_row(s: ContactArrays, row: int, count: int) -> int:
+    """Let one more row hold; how many do."""
+    s.rows[count], s.way[row // 3, row % 3] = row, 0.0
+    return count + 1
+
+
+@compiled
+def mobility(s: ContactArrays, row: int, other: int, jointed: bool) -> float:
+    """What a row changes of another, with the joints or as if there were none."""
+    if jointed:
+        return s.W[row, other]
+    own, total = s.lam_free.shape[0], 0.0
+    for k in range(s.v.shape[0]):
+        total += s.scaled[own + row, k] * s.scaled[own + other, k]
+    return total
+
+
+@compiled
+def factor_rows(s: ContactArrays, count: int, jointed: bool) -> int:
     """Factors of what rows change of each other; their rank."""
     for i in range(count):
         for k in range(count):
-            s.B[i, k] = s.W[s.rows[i], s.rows[k]]
+            s.B[i, k] = mobility(s, s.rows[i], s.rows[k], jointed)
     return factor_least(s.B, count, count, DEPENDENT, 0.0, s.w, s.order)
 
 
 @compiled
-def freedom_of(s: ContactArrays, row: int, count: int, rank: int) -> float:
+def freedom_of(s: ContactArrays, row: int, count: int, rank: int, jointed: bool) -> float:
     """What a row changes of itself where some rows hold."""
     for k in range(count):
-        s.x[k] = s.W[s.rows[k], row]
+        s.x[k] = mobility(s, s.rows[k], row, jointed)
     solve_least(s.B, count, count, rank, s.w, s.order, s.x, s.inner)
-    found = s.W[row, row]
+    found = mobility(s, row, row, jointed)
     for k in range(count):
-        found -= s.W[row, s.rows[k]] * s.inner[k]
+        found -= mobility(s, row, s.rows[k], jointed) * s.inner[k]
     return found

@@ -213,18 +213,19 @@ def call_element(t: float, e: int, q: int, system: System, loops: Any, tangent: 
             out[o + k] = force[f + k]
         for c in range(3):
             o, f = 6 * WIDTH * n + WIDTH * (3 + c), 6 * WIDTH * idx[i0 + n] + WIDTH * 3
-            set_product(0.0, s, WIDTH * (A + c), force, f, out, o)
-            set_product(1.0, s, WIDTH * (A + 3 + c), force, f + WIDTH, out, o)
-            set_product(1.0, s, WIDTH * (A + 6 + c), force, f + 2 * WIDTH, out, o)
+            zero(out[o : o + WIDTH])  # no part of it: it may have been no number, at a wild stage
+            add_product(s, WIDTH * (A + c), force, f, out, o)
+            add_product(s, WIDTH * (A + 3 + c), force, f + WIDTH, out, o)
+            add_product(s, WIDTH * (A + 6 + c), force, f + 2 * WIDTH, out, o)
 
 
 @compiled
-def set_product(keep: float, a: Floats, i: int, b: Floats, j: int, out: Floats, o: int) -> None:
-    """Value and slopes of keep * out[o] + a[i] b[j], into out[o]."""
+def add_product(a: Floats, i: int, b: Floats, j: int, out: Floats, o: int) -> None:
+    """Add value and slopes of a[i] b[j] to out[o]."""
     x, y = a[i], b[j]
-    out[o] = keep * out[o] + x * y
+    out[o] += x * y
     for lane in range(1, WIDTH):
-        out[o + lane] = keep * out[o + lane] + x * b[j + lane] + y * a[i + lane]
+        out[o + lane] = out[o + lane] + x * b[j + lane] + y * a[i + lane]
 
 
 @compiled
@@ -240,8 +241,7 @@ def add_reactions(i0: int, row: Integers, system: System, tangent: Tangent) -> N
             b, d = idx[i0 + n], WIDTH * (idx[at + n] + 6 * r)
             if b > 0:
                 for c in range(6):
-                    set_product(1.0, D, d + WIDTH * c, tangent.wide.body[b], WIDTH * (V + c),
-                                out, o)  # fmt: skip
+                    add_product(D, d + WIDTH * c, tangent.wide.body[b], WIDTH * (V + c), out, o)
                 for k in range(6 * WIDTH):
                     tangent.force[6 * WIDTH * b + k] -= D[d + k] * x
 

@@ -39,7 +39,7 @@ def held(mode):
 
 
 def holds(mode, way, k):
-    """True where row k of friction alone holds: where it sticks, but for those that others hold.
+    """True where row k of friction holds: where it sticks, but for those that joints hold.
 
     The components of ``way`` name these, 1.0; it is a direction of sliding in mode 1 alone.
     """
@@ -93,13 +93,13 @@ def position_within(gap, reach, mode):
     return where(is_beyond, FAR_APART, position(gap, mode))
 
 
-def blocks(c, n, grain, r_i, r_j, mode):
+def blocks(c, n, grain, r_i, r_j, mode, way):
     """J of both bodies."""
     first, second = tangents(n, grain)
     directions = (
         where(closed(mode), n, _ZERO),
-        where(held(mode), first, _ZERO),
-        where(held(mode), second, _ZERO),
+        where(holds(mode, way, 1), first, _ZERO),
+        where(holds(mode, way, 2), second, _ZERO),
     )
     s_i, s_j = sub(c, r_i), sub(c, r_j)
     return (
@@ -108,9 +108,9 @@ def blocks(c, n, grain, r_i, r_j, mode):
     )
 
 
-def block(c, n, grain, r_i, mode):
+def block(c, n, grain, r_i, mode, way):
     """J of a contact of one body with ground."""
-    return blocks(c, n, grain, r_i, _ZERO, mode)[0]
+    return blocks(c, n, grain, r_i, _ZERO, mode, way)[0]
 
 
 def slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j):
@@ -119,7 +119,7 @@ def slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j):
     return sub(of_i, add(v_j, cross(w_j, sub(c, r_j))))
 
 
-def gamma(c, c_dot, n, n_dot, grain, grain_dot, r_i, v_i, w_i, r_j, v_j, w_j, mode):
+def gamma(c, c_dot, n, n_dot, grain, grain_dot, r_i, v_i, w_i, r_j, v_j, w_j, mode, way):
     """-J_dot v, for a point of contact and a normal that move."""
     slip = slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j)
     bent = sub(cross(w_i, sub(c_dot, v_i)), cross(w_j, sub(c_dot, v_j)))
@@ -129,8 +129,8 @@ def gamma(c, c_dot, n, n_dot, grain, grain_dot, r_i, v_i, w_i, r_j, v_j, w_j, mo
     values = tuple(-dot(e_dot, slip) - dot(e, bent) for e, e_dot in pairs)
     return (
         where(closed(mode), values[0], 0.0),
-        where(held(mode), values[1], 0.0),
-        where(held(mode), values[2], 0.0),
+        where(holds(mode, way, 1), values[1], 0.0),
+        where(holds(mode, way, 2), values[2], 0.0),
     )
 
 
