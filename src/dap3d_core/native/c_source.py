@@ -13,6 +13,7 @@ from dap3d_core.assembly.metric import METRIC_WIDTH
 from dap3d_core.formulations import REPORT
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.jumps.jump_arrays import CROSSING, SIDE, JumpArrays
+from dap3d_core.integrators.moreau.step import START_ALONE
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration_state import IntegrationState
 from dap3d_core.kernels.compiler.units import Entry, Unit
@@ -301,14 +302,15 @@ def _completion(prepared: PreparedRun) -> list[str]:
     one = prepared.advances[0]
     if one.completes is None:
         return ["#define COMPLETES 0"]
-    symbol = symbol_of(one.completes)
-    types = ", ".join(["void *"] * len(one.arguments))
-    given = ", ".join(f"w + {prepared.image.at(part)}" for part in one.arguments)
+    symbol, place, (work, arrays) = symbol_of(one.completes), prepared.image.at, one.arguments[:2]
     return [
         "#define COMPLETES 1",
-        f"#define PUSHED {prepared.image.at(one.arguments[0].pushed)}",
-        f"_Bool {symbol}({types}, double *, int64_t);",
-        f"static void complete(int64_t *w, double *row) {{ {symbol}({given}, row, ROW); }}",
+        f"#define PUSHED {place(work.pushed)}",
+        f"#define STAGE {place(arrays.integer) + arrays.indices('integer')['stage']}",
+        f"#define START_ALONE {START_ALONE}",
+        f"void {symbol}(void *, void *, double *, int64_t);",
+        "static void complete(int64_t *w, double *row)",
+        f"{{ {symbol}(w + {place(work)}, w + {place(arrays)}, row, ROW); }}",
     ]
 
 

@@ -22,8 +22,9 @@ from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators.moreau.arrays import all_room, grown
 from dap3d_core.integrators.moreau.contact_set import POINTS
 from dap3d_core.integrators.moreau.free_motion import MOST_PARTS, PART
+from dap3d_core.integrators.moreau.impulses import put_means
 from dap3d_core.integrators.moreau.problem import arrays_of
-from dap3d_core.integrators.moreau.step import FOLLOWED, MOST_STEPS, advance, complete_row
+from dap3d_core.integrators.moreau.step import FOLLOWED, MOST_STEPS, START_ALONE, advance
 from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.integration_state import (
     OTHER,
@@ -137,8 +138,10 @@ class MoreauIntegration(Integration):
 
     def complete(self, row: Floats) -> None:
         """As ``Integration.complete``: accelerations and forces are means of the last step."""
-        while not self.call(complete_row, *self.loop_arguments, row):
-            self._arrays = grown(self._arrays)
+        if self.work.step_count == 0:
+            self._arrays.stage = START_ALONE
+            self._advance(0)
+        self.call(put_means, self.work, self._arrays, row)
 
     @property
     def contact_rows(self) -> Floats:  # type: ignore[override]

@@ -73,8 +73,9 @@ RENEWED, FOLLOWED, MOST_STEPS = 3, 2.0, 100
 #: Margin of contacts, as parts of the way of a step, and m of a scene of ordinary size.
 MARGIN, LEAST_MARGIN = 1.2, 1e-6
 #: Stages of a step that waits for room: the trial state is that without contacts; it is that where
-#: bodies have moved to, but may overlap; forces at the start are yet to be found.
-FREE, MOVED, START = 1, 2, 3
+#: bodies have moved to, but may overlap; forces at the start are yet to be found, before the steps
+#: or for a row alone, with no step.
+FREE, MOVED, START, START_ALONE = 1, 2, 3, 4
 
 
 @compiled
@@ -86,10 +87,13 @@ def advance(
     Or room is missing: ``stage`` says so.
     """
     limit = work.rhs_count + budget
-    starts = work.next_report == 0 and work.status == RUNNING and s.stage in (0, START)
-    if starts and s.is_exported == 0:
-        s.stage = 0 if push_at_start(work, s, functions[0], system, loops) else START
-        if s.stage == START:
+    if s.stage == 0 and work.next_report == 0 and work.status == RUNNING and s.is_exported == 0:
+        s.stage = START
+    if s.stage >= START:
+        is_alone = s.stage == START_ALONE
+        has_room = push_at_start(work, s, functions[0], system, loops)
+        s.stage = 0 if has_room or s.is_exported != 0 else s.stage
+        if is_alone or not has_room:
             return
     while s.stage != 0 or goes_on(work, s, functions, system, loops, limit):
         if s.stage == 0:
@@ -141,17 +145,6 @@ def fly(work: Any, s: StepArrays, rhs: Function, system: System, loops: Any) -> 
     s.t1 = next_end(work)
     s.h = s.t1 - work.t
     move_freely(work, s, rhs, system, loops)
-
-
-@compiled
-def complete_row(
-    work: Any, s: StepArrays, functions: Any, system: System, loops: Any, row: Floats
-) -> bool:
-    """Put means of the last step, at the start of the first one, into a row; False without room."""
-    if work.step_count == 0 and not push_at_start(work, s, functions[0], system, loops):
-        return False
-    put_means(work, s, row)
-    return True
 
 
 @compiled

@@ -17,9 +17,9 @@ from dap3d_core.formulations.jumps.rounds import jump
 from dap3d_core.integrators import IMPLICIT, Integration
 from dap3d_core.integrators.adams.integration import AdamsIntegration
 from dap3d_core.integrators.adams.step import advance_adams
+from dap3d_core.integrators.moreau.impulses import put_means
 from dap3d_core.integrators.moreau.integration import MoreauIntegration
 from dap3d_core.integrators.moreau.step import advance as advance_contacts
-from dap3d_core.integrators.moreau.step import complete_row
 from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.integrators.radau.integration import RadauIntegration
 from dap3d_core.integrators.radau.step import advance as advance_radau
@@ -81,7 +81,7 @@ class Advance:
         integration: as it begins.
         entry: the loop.
         arguments: structs and tables that it takes before the budget.
-        completes: puts into a row what a report does not know; of the same arguments.
+        completes: puts into a row what a report does not know; of the first two arguments.
     """
 
     integration: Integration
@@ -103,8 +103,9 @@ class Advance:
         completes = None
         if isinstance(integration, MoreauIntegration):
             integration.make_room()
-            more: Any = complete_row
-            completes = more.compile([*map(type_of, integration.loop_arguments), Array(FLOAT, 1)])
+            means: Any = put_means
+            changed = integration.loop_arguments[:2]
+            completes = means.compile([*map(type_of, changed), Array(FLOAT, 1)])
         if isinstance(integration, RadauIntegration):
             function = advance_radau
         elif function is None:

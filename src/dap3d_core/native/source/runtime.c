@@ -207,6 +207,12 @@ static void report(dap3d_model *m)
     if (!m->is_ahead)
         memcpy(m->row + 1, y_of(m), 8 * STATES);
     m->row[0] = m->t;
+#if COMPLETES
+    if (integer_of(m)[I_step_count] == 0) {
+        m->w[STAGE] = START_ALONE;
+        integrations[0].advance(m->w, 0);
+    }
+#endif
     call(m, REPORT, m->t, m->row + 1, m->row + 1 + STATES, ROW - 1 - STATES);
 #if COMPLETES
     complete(m->w, m->row);
