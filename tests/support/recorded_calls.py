@@ -166,9 +166,8 @@ def is_constant(type_):
     return isinstance(type_, Known)
 
 
-def wrapper_of(function, types):
+def wrapper_of(function, types, result):
     """A function of the same arguments that writes the results of a function into an array."""
-    _, result = Program().function(function, types)
     names = ", ".join(f"a{k}" for k in range(len(types)))
     given = ", ".join(f"a{k}[0]" if t in BY_ARRAY else f"a{k}" for k, t in enumerate(types))
     lines = [f"def f({names}, out):", f"    r = target({given})", "    k = 0"]
@@ -199,18 +198,19 @@ def numbers_of(result):
     return [] if result is None else np.ravel(result).tolist()
 
 
-def exported(program, function, before, index):
+def exported(translated, function, before, index):
     """Compile a function for recorded arguments: symbol, signature, indices of its arguments."""
     parameters = function._parameters
     types = [compiled_type(v, p) for v, p in zip(before, parameters, strict=True)]
     try:
-        wrapper = wrapper_of(function, types)
+        result = translated.result_of(function, types)
     except CompileError:  # put into its callers with constants, and needs some of them
         types = [Known(v) if t == INT else t for v, t in zip(before, types, strict=True)]
-        wrapper = wrapper_of(function, types)
+        result = translated.result_of(function, types)
+    wrapper = wrapper_of(function, types, result)
     types = [Array(t, 1) if t in BY_ARRAY else t for t in types]
     symbol = f"recorded_{index}"
-    program.export(wrapper, (*types, Array(COMPLEX, 1)), symbol)
+    translated.program.export(wrapper, (*types, Array(COMPLEX, 1)), symbol)
     variable = [k for k, t in enumerate(types) if not is_constant(t)]
     signature = Signature((*(types[k] for k in variable), Array(COMPLEX, 1)))
     return symbol, signature, variable
@@ -221,10 +221,19 @@ class Translated:
 
     def __init__(self):
         self.program, self.signatures = Program(), {}
+        self.trial = Program()
         #: Of calls by function and kinds of arguments: what ``exported`` returns.
         self.wrappers = {}
         #: Symbols of the compiled functions that stand in tables.
         self.items = {}
+
+    def result_of(self, function, types):
+        """The type of a function's result; what cannot be translated leaves nothing behind."""
+        try:
+            return self.trial.function(function, types)[1]
+        except CompileError:
+            self.trial = Program()
+            raise
 
 
 def differences(calls, levels=None, translated=None):
@@ -241,7 +250,7 @@ def differences(calls, levels=None, translated=None):
     for function, before, _, _ in calls:
         key = function, tuple(map(kind, before))
         if key not in wrappers:
-            wrappers[key] = exported(program, function, before, len(wrappers))
+            wrappers[key] = exported(translated, function, before, len(wrappers))
             signatures[wrappers[key][0]] = wrappers[key][1]
         for table in (v for v in before if isinstance(v, PlainTable)):
             for item in table:

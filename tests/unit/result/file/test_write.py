@@ -227,7 +227,7 @@ def test_a_full_disk(tmp_path):
         sys.path.insert(0, {TESTS!r})
         from support.results import circling
         from dap3d_core.result import ResultError
-        result = circling(nt=5000)[0]
+        result = circling(nt=1000)[0]
         sys.dont_write_bytecode = True  # it would be cut off, and kept
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, resource.RLIM_INFINITY))

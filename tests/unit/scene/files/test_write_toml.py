@@ -14,6 +14,8 @@ from dap3d_core.scene import check
 
 import tomllib  # isort: skip
 
+REGISTRY = dap.load_registry()
+
 names = st.text(min_size=1, max_size=8).filter(lambda s: not fault_of_name(s))
 floats = st.floats(allow_nan=False, allow_infinity=False)
 positive = st.floats(min_value=1e-3, max_value=1e3)
@@ -84,14 +86,14 @@ def test_even_a_scene_of_nonsense_is_written_without_loss(scene):
 @settings(deadline=None, max_examples=50)
 @given(scenes())
 def test_a_scene_that_was_written_is_read_back_bit_for_bit_and_checked_alike(scene):
-    registry, again = dap.load_registry(), scene_of(tomllib.loads(scene.to_toml()))
+    again = scene_of(tomllib.loads(scene.to_toml()))
     assert again == scene
     assert bits(again) == bits(scene), "order of the tables and bits of the floats"
     assert again.to_toml() == scene.to_toml()
 
     def answer(s):
         try:
-            return [], check(s, registry).notes
+            return [], check(s, REGISTRY).notes
         except dap.SceneError as error:
             return [m.key for m in error.mistakes], []
 
