@@ -48,8 +48,9 @@ FEW, RESIDUAL_ROUNDING = 100, 1e-14
 WEIGHT, MOST_WEIGHT = 1e5, 1e10
 #: Passes in which joints answer: what hardly moves must not be felt as if it gave.
 FELT = 2
-#: A round helps where it leaves less than this part of the residual. Rounds at most.
-HELPS, ROUNDS = 0.5, 40
+#: A round helps where it leaves less than this part of the residual, and asks for a larger weight
+#: where it leaves less than the next: what hardly moves is felt with that alone. Rounds at most.
+HELPS, SLOW, ROUNDS = 0.5, 0.95, 40
 #: Part of the tolerance to which a round is solved.
 INNER = 1e-2
 #: A residual from which a round that does not help is the last.
@@ -292,7 +293,10 @@ def newton(s: StepArrays, tolerance: float, is_reduced: bool) -> float:
             exchange(s)
         new = residual_after(s, is_reduced)
         helps = new <= HELPS * left
-        weight = min(weight / LESS, most) if helps else weight * LESS
+        if helps or (new < SLOW * left and s.carries == 0):
+            weight = min(weight / LESS, max(most, weight) if helps else MOST_WEIGHT)
+        else:
+            weight *= LESS
         if new >= left:
             exchange(s)
             put_velocities(s, s.v)
