@@ -111,6 +111,7 @@ class StepArrays(Arrays):
     t1 = _real()  # s, end of the step, and its length
     h = _real()
     residual = _real()
+    least = _real()  # N s, an impulse beside which residuals of a problem of joints are rounding
     factored = _real()  # weight whose matrix K has the factors of, or 0
     length = _real()  # of the scene, m
 

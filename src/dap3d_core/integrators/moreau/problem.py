@@ -44,6 +44,9 @@ RELAX = 1.4
 MOST_SWEEPS = 2000
 #: Contacts up to which a problem is solved to rounding, whatever the tolerance.
 FEW, RESIDUAL_ROUNDING = 100, 1e-14
+#: Part of the largest momentum that the velocities of joints have rounding of, over that asked for:
+#: where nothing presses, joints pull by that rounding alone.
+LEAST_IMPULSE = 1e-3
 #: Weights times the masses that rows feel: at first, and at most in the problem of contacts alone.
 WEIGHT, MOST_WEIGHT = 1e5, 1e10
 #: Passes in which joints answer: what hardly moves must not be felt as if it gave.
@@ -136,9 +139,11 @@ def solve(s: StepArrays, tolerance: float) -> bool:
         tolerance: of the residual, a part of the largest impulse.
     """
     few, joined = s.contact_count <= FEW, s.y.size > 0
+    s.least = 0.0
     for b in range(s.v.shape[0]):
         for k in range(6):
             s.v[b, k] = s.trial[b, k] = s.free[b, k]
+            s.least = max(s.least, LEAST_IMPULSE * s.mass[b] * abs(s.free[b, k if k < 3 else 0]))
     choose(s, -1)
     if few or joined:
         aim = RESIDUAL_ROUNDING if few and tolerance < NEAR else tolerance
