@@ -298,7 +298,7 @@ def newton(s: StepArrays, tolerance: float, is_reduced: bool) -> float:
             exchange(s)
         new = residual_after(s, is_reduced)
         helps = new <= HELPS * left
-        if helps or (new < SLOW * left and s.carries == 0):
+        if helps or (new < SLOW * left):
             weight = min(weight / LESS, max(most, weight) if helps else MOST_WEIGHT)
         else:
             weight *= LESS
