@@ -201,43 +201,6 @@ def test_a_declared_column_that_spins_stands_on_its_rim_alone():
     assert turned == pytest.approx(R * w**2 / (4.0 * mu * G), rel=1e-4)  # h^2 of 0.1 s
 
 
-def test_a_pair_without_loss_keeps_its_energy():
-    scene = dap.Scene(name="pair")
-    scene.add_material("surface", e=1.0)
-    scene.add_collisions(material="surface")
-    balls = ("a", 2.0, [0.0] * 3, [3.0, 0.1, 0.0]), ("b", 1.0, [0.5, 0.02, 0.01], [0.0] * 3)
-    for name, mass, r, v in balls:
-        scene.add_body(name, mass=mass, Jp=[0.004 * mass] * 3, r=r, r_dot=v)
-        scene.add_shape("sphere", body=name, radius=0.1, collides=True)
-    result = dap.simulate(scene, t_end=0.5, dt=0.1)
-    energy = (np.array([2.0, 1.0]) * (result.rd**2).sum(axis=2)).sum(axis=1)
-    assert result.rd[-1, 1, 0] > 3.0
-    assert energy[-1] == pytest.approx(energy[0], rel=1e-12)
-
-
-@pytest.mark.parametrize(("e", "left"), [(1.0, 1.0), (0.9, 0.0)])
-def test_a_ball_that_bounces_has_the_energy_of_its_height(e, left):
-    """20 s at 10 ms: all of it, or none where it has come to rest; limit: rounding."""
-    result = dap.simulate(ball(height=1.0, v=0.0, e=e), t_end=20.0, dt=1.0, contact_step=1e-2)
-    energy = result.energy.total - 2.0 * G * 0.1
-    assert abs(energy[-1] / energy[0] - left) < 1e-12
-    # Once it gained m G h v a bounce, by impulses of an impact that did work on what they stopped.
-    assert result.ledger["contact work"].value < 1e-9
-    assert result.ledger["energy"].value < 1e-9
-
-
-@pytest.mark.parametrize(("mu", "most"), [(0.0, 0.03), (0.5, 1e-3)])
-def test_a_box_that_tumbles_does_not_gain_energy(mu, most):
-    """e = 1, 20 s at 1 ms; limits: of order h, of some 40 impacts. By Newton's law alone: 0.033."""
-    scene = dap.Scene(name="box")
-    scene.add_body("box", mass=1.0, Jp=[0.01, 0.015, 0.02], r=[0, 0, 1.1], w=[1.0, 2.0, 3.0])
-    scene.add_shape("box", body="box", size=[0.4, 0.3, 0.1], collides=True)
-    result = dap.simulate(collide(scene, mu=mu, e=1.0), t_end=20.0, dt=0.1, contact_step=1e-3)
-    change = result.energy.total / result.energy.total[0] - 1.0
-    assert change.max() < most
-    assert mu > 0.0 or change.min() > -most
-
-
 def test_what_rests_on_a_slope_has_no_work_of_friction():
     """Limit: rounding of what friction would take at the speed of one step of falling, 0.01 J."""
     result = dap.simulate(slope(), t_end=2.0, dt=1.0, contact_step=5e-3)
@@ -246,7 +209,7 @@ def test_what_rests_on_a_slope_has_no_work_of_friction():
 
 
 def test_stepping_tends_to_events():
-    """A ball dropped onto a floor, e = 0: where it is after 0.5 s differs by the order of h."""
+    """A ball dropped onto a floor, e = 0: it differs by less than what it falls in a step."""
     declared = dap.Scene(name="declared")
     declared.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=[0, 0, 0.3], r_dot=[1.0, 0, 0])
     declared.add_contact("ball_plane", P_i="ball.O", radius=0.1, mu=0.3)
@@ -254,7 +217,7 @@ def test_stepping_tends_to_events():
     exact = dap.simulate(declared, t_end=0.5, dt=0.5, contact="events").r[-1, 0]
     for h in (8e-3, 2e-3):
         found = dap.simulate(ball(0.2, 1.0, mu=0.3), t_end=0.5, dt=0.5, contact_step=h).r[-1, 0]
-        assert np.abs(found - exact).max() < 0.5 * h  # its velocities are some 1 m/s
+        assert np.abs(found - exact).max() < G * h**2
 
 
 @pytest.mark.every(3)
@@ -323,7 +286,8 @@ def leg(**limits):
 def test_limits_that_are_far_away_change_nothing():
     """Beside them the joints' rows are solved by another method, to the residual of a step.
 
-    Impulses have 1e-6 of the largest one then (1 N s by 1 kg); a projection adds nothing to that.
+    That of nothing but rounding is none, as before the foot lands: by impulses of it alone the
+    residual was 1, and 1e-6 came of it.
     """
     settings = {"t_end": 0.05, "dt": 0.01, "contact_step": 1e-3}
     free, limited = (
@@ -331,7 +295,8 @@ def test_limits_that_are_far_away_change_nothing():
     )
     assert np.abs(free.w[-1]).max() > 1.0  # it has landed, and turns
     assert (free.method, limited.method) == ("standard", "lsq")
-    assert limited.u == pytest.approx(free.u, rel=0, abs=1e-6)
+    assert max(run.record.stepping["largest_residual"] for run in (free, limited)) < 1e-12
+    assert limited.u == pytest.approx(free.u, rel=0, abs=1e-9)
 
 
 def test_stiff_dampers_do_not_explode():

@@ -415,7 +415,7 @@ class RunState:
         if not states:
             return {}
         most = ("largest_residual", "deepest")
-        sums = ("contact_work", "friction_work", "work_given", "work_open")
+        sums = ("contact_work", "friction_work", "work_given")
         found = {name: max(float(getattr(work, name)) for work in states) for name in most}
         found |= {name: sum(float(getattr(work, name)) for work in states) for name in sums}
         return {"stepping": found}

@@ -4,7 +4,7 @@ import numpy as np
 from rigid import Array
 
 GRAVITY, TRUNK, THIGH, SHIN = 9.81, 10.0, 0.6, 0.4
-LENGTHS, BENT, FOOT = 0.16 + 0.16, 0.5, 0.03
+LENGTHS, BENT, FOOT = 0.16 + 0.16, 0.9, 0.03
 
 
 def quantities(_: float) -> dict[str, Array]:

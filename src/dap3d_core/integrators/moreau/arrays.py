@@ -72,9 +72,8 @@ class StepArrays(Arrays):
         **dict.fromkeys(("bodies", "declared_bodies", "declared_place"), INTEGER_MATRIX),
         **dict.fromkeys(
             ("poses", "Jp", "Jp_inverse", "spin", "spin_inverse", "before", "free", "v", "delta",
-             "trial", "rest", "trial_rest", "end", "J", "moved", "own", "own_held", "x", "u", "z",
-             "B", "B_factored", "push",
-             "kept", "met", "D", "declared_x", "log",
+             "trial", "rest", "trial_rest", "end", "path", "J", "moved", "own", "own_held",
+             "x", "u", "z", "B", "B_factored", "push", "kept", "met", "D", "declared_x", "log",
              "felt", "answer", "missing", "bounce", "v_bounce", "x_bounce",
              "carried", "bias"),
             MATRIX,
@@ -112,6 +111,7 @@ class StepArrays(Arrays):
     t1 = _real()  # s, end of the step, and its length
     h = _real()
     residual = _real()
+    least = _real()  # N s, an impulse beside which residuals of a problem of joints are rounding
     factored = _real()  # weight whose matrix K has the factors of, or 0
     length = _real()  # of the scene, m
 
@@ -137,8 +137,9 @@ class StepArrays(Arrays):
     rest: Floats
     trial_rest: Floats
     end: Floats  # at the end of the step
-    hit: Floats  # the part of the step at which a body is hit; and 1 where it flies else
-    flies: Floats
+    path: Floats  # means of velocities of motion without contacts, with accelerations ``pushed``
+    hit: Floats  # the part of the step at which a body is hit
+    flies: Floats  # the part of its change without contacts that these do not bear else
     bounce: Floats  # (n + 1, 5) of each group (restitution.py)
     v_bounce: Floats  # (n + 1, 6), (c, 3), (k,) what bounces lead to
     x_bounce: Floats
@@ -296,7 +297,8 @@ def _of_bodies(model: Model) -> dict[str, Any]:
     found: dict[str, Any] = {
         **{name: np.zeros((n + 1, 9)) for name in ("Jp", "Jp_inverse", "spin", "spin_inverse")},
         **{name: np.zeros((n + 1, 6)) for name in (
-            "before", "free", "v", "delta", "trial", "rest", "trial_rest", "end", "v_bounce")},
+            "before", "free", "v", "delta", "trial", "rest", "trial_rest", "end", "path",
+            "v_bounce")},
         "bounce": np.zeros((n + 1, 5)),
         "carried": np.zeros((n + 1, 2)),
         **{name: np.zeros(n + 1) for name in (

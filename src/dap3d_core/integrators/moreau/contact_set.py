@@ -211,11 +211,14 @@ def put_touch(c: int, s: StepArrays) -> None:
     first, second = shapes.material[i], shapes.material[j]
     s.mu[c], s.e[c] = shapes.mu[first, second], shapes.e[first, second]
     put_frame(found[3], found[4], found[5], J)
+    half = 0.5 * found[6]
     for r in range(3):
         x, y, z = J[12 * r], J[12 * r + 1], J[12 * r + 2]
         for side in range(2):
             pose, sign, k = s.poses[a if side == 0 else b], 1.0 - 2.0 * side, 12 * r + 6 * side
-            p, q, w = found[0] - pose[0], found[1] - pose[1], found[2] - pose[2]
+            p, q, w = (found[0] + sign * half * found[3] - pose[0],
+                       found[1] + sign * half * found[4] - pose[1],
+                       found[2] + sign * half * found[5] - pose[2])  # fmt: skip
             J[k], J[k + 1], J[k + 2] = sign * x, sign * y, sign * z
             J[k + 3], J[k + 4] = sign * (q * z - w * y), sign * (w * x - p * z)
             J[k + 5] = sign * (p * y - q * x)

@@ -31,8 +31,12 @@ def move_freely(work: Any, s: StepArrays, rhs: Function, system: System, loops: 
     slope, middle, parts = s.slopes[:size], s.slopes[size:], parts_of(work, s)
     copy(free, y)
     h = s.h / parts
+    n = s.mass.size - 1
     for k in range(s.y_free.size):
         s.y_free[k] = 0.0
+    for b in range(1, n + 1):
+        for i in range(6):
+            s.path[b, i] = 0.0
     for k in range(parts):
         begun = t + k * h
         rhs(begun, free, slope, system, loops)
@@ -45,8 +49,11 @@ def move_freely(work: Any, s: StepArrays, rhs: Function, system: System, loops: 
             free[i] += h * slope[i]
         for i in range(s.y_free.size if s.load_count.size > 0 else 0):
             s.y_free[i] -= h * system.multipliers[system.row[i]]
-        for b in range(1, s.mass.size):
+        take_velocities(middle, n, s.rest)
+        for b in range(1, n + 1):
             normalise(free, coordinate_offset(b) + 3)
+            for i in range(6):
+                s.path[b, i] += s.rest[b, i] / parts
         work.rhs_count += 2
 
 

@@ -8,7 +8,8 @@ Anitescu and Potra (Nonlinear Dynamics 14, 1997): a step of length h is
 where v_free comes of the explicit midpoint rule without contacts, in parts of the step where forces
 are stiff, and bias of the normal is e u_N
 of before where a gap closes at speed, else max(gap, 0) / h. Positions follow by the trapezoidal
-rule, second order, or by v+ for bodies that collide; then what overlaps is moved apart.
+rule, second order; those of bodies that collide by velocities that jump when the first gap of their
+group closes. Then what overlaps is moved apart.
 """
 
 from collections.abc import Iterator
@@ -56,7 +57,6 @@ class MoreauState(IntegrationState):
     largest_residual = _measure()  # of all steps, a part of the largest impulse of each
     contact_work = _measure()  # of all steps so far, J
     friction_work = _measure()  # the part of friction
-    work_open = _measure()  # what moving by velocities behind impacts may change of energies, J
     work_given = _measure()  # that of steps in which it is positive, J
     deepest = _measure()  # largest overlap at the end of a step, m
     overlap_at_start = _measure()  # that of before the first step, m, which moves bodies apart

@@ -216,7 +216,7 @@ def residual_of(s: StepArrays, v: Floats, left: float) -> float:
     for k in range(s.y.size):
         speed = speed_of(s, k, v) - speed_of(s, k, s.free)
         left, largest = max(left, abs(s.s[k] * speed)), max(largest, abs(s.y[k]))
-    return left / (largest + TINY)
+    return left / max(largest, s.least, TINY)
 
 
 # ------------------------------------------------------------------ a round

@@ -44,12 +44,16 @@ RELAX = 1.4
 MOST_SWEEPS = 2000
 #: Contacts up to which a problem is solved to rounding, whatever the tolerance.
 FEW, RESIDUAL_ROUNDING = 100, 1e-14
+#: Part of the largest momentum that the velocities of joints have rounding of, over that asked for:
+#: where nothing presses, joints pull by that rounding alone.
+LEAST_IMPULSE = 1e-3
 #: Weights times the masses that rows feel: at first, and at most in the problem of contacts alone.
 WEIGHT, MOST_WEIGHT = 1e5, 1e10
 #: Passes in which joints answer: what hardly moves must not be felt as if it gave.
 FELT = 2
-#: A round helps where it leaves less than this part of the residual. Rounds at most.
-HELPS, ROUNDS = 0.5, 40
+#: A round helps where it leaves less than this part of the residual, and asks for a larger weight
+#: where it leaves less than the next: what hardly moves is felt with that alone. Rounds at most.
+HELPS, SLOW, ROUNDS = 0.5, 0.95, 40
 #: Part of the tolerance to which a round is solved.
 INNER = 1e-2
 #: A residual from which a round that does not help is the last.
@@ -135,9 +139,11 @@ def solve(s: StepArrays, tolerance: float) -> bool:
         tolerance: of the residual, a part of the largest impulse.
     """
     few, joined = s.contact_count <= FEW, s.y.size > 0
+    s.least = 0.0
     for b in range(s.v.shape[0]):
         for k in range(6):
             s.v[b, k] = s.trial[b, k] = s.free[b, k]
+            s.least = max(s.least, LEAST_IMPULSE * s.mass[b] * abs(s.free[b, k if k < 3 else 0]))
     choose(s, -1)
     if few or joined:
         aim = RESIDUAL_ROUNDING if few and tolerance < NEAR else tolerance
@@ -292,7 +298,10 @@ def newton(s: StepArrays, tolerance: float, is_reduced: bool) -> float:
             exchange(s)
         new = residual_after(s, is_reduced)
         helps = new <= HELPS * left
-        weight = min(weight / LESS, most) if helps else weight * LESS
+        if helps or (new < SLOW * left):
+            weight = min(weight / LESS, max(most, weight) if helps else MOST_WEIGHT)
+        else:
+            weight *= LESS
         if new >= left:
             exchange(s)
             put_velocities(s, s.v)

@@ -16,6 +16,7 @@ from dap3d_core.integrators.moreau.gauss_seidel import copy_impulses
 from dap3d_core.integrators.moreau.matrix import find_groups, root_of
 from dap3d_core.integrators.moreau.problem import solve
 from dap3d_core.integrators.stepping.vector_ops import copy
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: Columns of ``bounce``: work of the impulses of a group with the bounce, half of it, and without;
@@ -25,13 +26,15 @@ WITH, HALF, WITHOUT, EXCHANGED, KEPT = range(5)
 GAIN_ROUNDING = 1e-12
 #: Gaps, m of a scene of ordinary size, below which overlaps are left.
 OVERLAP = 1e-12
+#: Part of the step where bodies are not hit, and the least part behind a hit that counts.
+NOT_HIT, SHORT = 2.0, 1e-9
 #: A contact collides where it approaches by more than this times h times the acceleration.
 COLLIDES = 4.0
 
 
 @compiled
 def put_bias(s: StepArrays) -> bool:
-    """What is added to normal velocities; True if bodies collide."""
+    """What is added to normal velocities, and when bodies are hit; True if bodies collide."""
     fall, found = 0.0, False
     for b in range(s.free.shape[0]):
         for k in range(3):
@@ -39,21 +42,59 @@ def put_bias(s: StepArrays) -> bool:
     for c in range(s.contact_count):
         bias, s.collides[c] = s.bias[c], 0
         bias[0] = bias[1] = bias[2] = 0.0
-        if s.gap[c] > OVERLAP * s.length:  # redundant contacts would disagree by less
-            bias[0] = s.gap[c] / s.h
         if s.kind[c] != CONE:
             continue
         approach, _, _ = velocity_of(s, c, s.before)
         normal, _, _ = velocity_of(s, c, s.free)
-        change = max(fall, abs(normal - approach))  # by turning, too
-        if approach < -COLLIDES * change and s.gap[c] + s.h * min(approach, normal) < 0.0:
-            s.collides[c], found = STOPS, True
-            s.closing[c] = closing_of(max(s.gap[c], 0.0), s.h * approach, s.h * (normal - approach))
+        change, gap = max(fall, abs(normal - approach)), max(s.gap[c], 0.0)  # by turning, too
+        if approach < -COLLIDES * change and gap + s.h * min(approach, normal) < 0.0:
+            s.closing[c] = closing_of(gap, s.h * approach, s.h * (normal - approach))
             last = 1.0 - s.closing[c]
             back = last * (normal - approach) - s.e[c] * (normal - last * (normal - approach))
             if s.e[c] > 0.0 and back > 0.0:
-                s.collides[c], bias[0] = BOUNCES, -back
+                s.collides[c], bias[0], found = BOUNCES, -back, True
+            elif gap + s.h * approach < 0.0:  # what it falls by meanwhile is borne
+                s.collides[c], s.closing[c], found = STOPS, -gap / (s.h * approach), True
+    put_hits(s, found)
+    for c in range(s.contact_count):  # redundant contacts would disagree by less
+        if s.gap[c] > OVERLAP * s.length and s.collides[c] == 0:
+            first = s.hit[max(s.bodies[c, 0], s.bodies[c, 1])]
+            first = first if first != NOT_HIT else 0.0
+            approach, _, _ = velocity_of(s, c, s.before)
+            last = max(1.0 - first, SHORT)
+            s.bias[c, 0] = max(s.gap[c] + first * s.h * approach, 0.0) / (last * s.h)
     return found
+
+
+@compiled
+def put_hits(s: StepArrays, any_collides: bool) -> None:
+    """When bodies are hit, as parts of the step: all of a group at the first instant."""
+    for b in range(s.hit.size):
+        s.hit[b], s.flies[b] = NOT_HIT, 1.0
+    if not any_collides:
+        return
+    find_groups(s)
+    for c in range(s.contact_count):
+        if s.collides[c] != 0:
+            s.hit[s.group[c]] = min(s.hit[s.group[c]], s.closing[c])
+    spread(s, s.hit)
+
+
+@compiled
+def put_flies(s: StepArrays) -> None:
+    """Mark the groups of which something stops, or is borne, by 0."""
+    find_groups(s)
+    for c in range(s.contact_count):
+        if s.collides[c] != BOUNCES and (s.collides[c] == STOPS or s.x[c, 0] > 0.0):
+            s.flies[s.group[c]] = 0.0
+    spread(s, s.flies)
+
+
+@compiled
+def spread(s: StepArrays, of_group: Floats) -> None:
+    """Give all bodies what their groups have."""
+    for b in range(of_group.size):
+        of_group[b] = of_group[root_of(s.parent, b) if s.y.size == 0 else 0]
 
 
 @compiled

@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 from dap3d_core.assembly.arrays import System, coordinate_offset, velocity_offset
-from dap3d_core.integrators.moreau.arrays import BOUNCES, CONE, STAYS, STOPS, WHOLE, StepArrays
+from dap3d_core.integrators.moreau.arrays import CONE, STAYS, WHOLE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import (
     axes_of,
     evaluate_rows,
@@ -36,10 +36,15 @@ from dap3d_core.integrators.moreau.impulses import (
     remember,
     slot_of,
 )
-from dap3d_core.integrators.moreau.matrix import find_groups, root_of
-from dap3d_core.integrators.moreau.newton import product_of, speed_of
+from dap3d_core.integrators.moreau.newton import TINY, product_of, speed_of
 from dap3d_core.integrators.moreau.problem import NEAR, prepare_problem, solve
-from dap3d_core.integrators.moreau.restitution import OVERLAP, limit_bounces, put_bias
+from dap3d_core.integrators.moreau.restitution import (
+    NOT_HIT,
+    OVERLAP,
+    limit_bounces,
+    put_bias,
+    put_flies,
+)
 from dap3d_core.integrators.stepping.integration_state import (
     DRIVEN,
     NO_ROOM,
@@ -62,8 +67,6 @@ from dap3d_core.kernels.runtime.cache import compiled
 TURNING = 1e-6
 #: Passes that remove overlaps.
 PASSES = 8
-#: Part of the step where bodies are not hit.
-NOT_HIT = 2.0
 #: Parts of a step by which times differ that are meant to be one.
 SAME_TIME = 1e-9
 #: Steps between two passes of an estimate of the rate of forces. Of this over the rate are steps
@@ -226,9 +229,10 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
             return False
         if not let_slip(s):
             break
-    put_hits(s, any_collides)
-    if any_collides and not limit_bounces(s, work.rtol):
-        return False
+    if any_collides:
+        put_flies(s)
+        if not limit_bounces(s, work.rtol):
+            return False
     s.is_solved = 1
     work.largest_residual = max(work.largest_residual, s.residual)
     remember(work, s)
@@ -240,27 +244,53 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
 
 @compiled
 def carry_on(work: Any, s: StepArrays) -> None:
-    """Move the bodies by what contacts give them, as the trial state."""
-    y, trial = work.state[Y], work.state[TRIAL]
+    """Move the bodies that contacts or joints act on as they do, as the trial state."""
+    y, trial, h = work.state[Y], work.state[TRIAL], s.h
+    put_falls(s)
     for b in range(1, s.end.shape[0]):
-        c, d = coordinate_offset(b), s.trial[b]
-        for k in range(7 if s.hit[b] != NOT_HIT else 0):  # from where it was
-            trial[c + k] = y[c + k]
+        c, d, goes = coordinate_offset(b), s.trial[b], s.y.size > 0 or s.hit[b] != NOT_HIT
         for k in range(6):
-            d[k] = way_of(work, s, b, k)
-        move(trial, c, d[0], d[1], d[2], d[3], d[4], d[5])
+            d[k] = mean_of(s, b, k)
+            goes |= s.end[b, k] != s.free[b, k] or work.pushed[b, k] != 0.0
+        if not goes:
+            copy(d, s.path[b])
+            continue
+        for k in range(7):
+            trial[c + k] = y[c + k]
+        move(trial, c, h * d[0], h * d[1], h * d[2], h * d[3], h * d[4], h * d[5])
     trial[trial.size - 1] += work_done(work, s)
     keep_pushed(work, s)
 
 
 @compiled
-def way_of(work: Any, s: StepArrays, b: int, k: int) -> float:
-    """How far a body goes by impulses; one that is hit, at all."""
-    before, free, end, first = s.before[b, k], s.free[b, k], s.end[b, k], s.hit[b]
+def put_falls(s: StepArrays) -> None:
+    """Put what part of their change without contacts bodies that are hit fall by, ``flies``.
+
+    Contacts bear the rest, as far as they push against that change; of jointed bodies, as a whole.
+    """
+    borne = size = 0.0
+    for b in range(1, s.end.shape[0]):
+        if s.hit[b] != NOT_HIT and s.flies[b] == 0.0:
+            for k in range(6):
+                s.change[k], s.turned[k] = s.free[b, k] - s.before[b, k], s.free[b, k] - s.end[b, k]
+            borne += product_of(s.change, s.turned, s.mass[b], s.spin[b])
+            size += product_of(s.change, s.change, s.mass[b], s.spin[b])
+            if s.y.size == 0:
+                s.flies[b] = 1.0 - min(max(borne / max(size, TINY), 0.0), 1.0)
+                borne = size = 0.0
+    for b in range(1, s.end.shape[0] if s.y.size > 0 else 1):
+        if s.flies[b] == 0.0:
+            s.flies[b] = 1.0 - min(max(borne / max(size, TINY), 0.0), 1.0)
+
+
+@compiled
+def mean_of(s: StepArrays, b: int, k: int) -> float:
+    """Mean of a velocity in the step."""
+    before, end, first = s.before[b, k], s.end[b, k], s.hit[b]
     if first == NOT_HIT:
-        return 0.5 * s.h * (end - free - s.h * work.pushed[b, k])
-    fall, last = s.flies[b] * (free - before), 1.0 - first
-    return s.h * (first * (before + 0.5 * first * fall) + last * (end - 0.5 * last * fall))
+        return 0.5 * (before + end)
+    fall, last = s.flies[b] * (s.free[b, k] - before), 1.0 - first
+    return first * (before + 0.5 * first * fall) + last * (end - 0.5 * last * fall)
 
 
 @compiled
@@ -348,50 +378,30 @@ def put_middle(work: Any, s: StepArrays) -> Floats:
 
 
 @compiled
-def put_hits(s: StepArrays, any_collides: bool) -> None:
-    """When bodies are hit, as parts of the step, and whether their group flies else.
-
-    All of a group at once: where all that collides bounces at the first instant, else at the start.
-    """
-    for b in range(s.hit.size):
-        s.hit[b], s.flies[b] = NOT_HIT, 1.0
-    if not any_collides:
-        return
-    find_groups(s)
-    for c in range(s.contact_count):
-        g = s.group[c]
-        if s.collides[c] == BOUNCES:
-            s.hit[g] = min(s.hit[g], s.closing[c])
-        elif s.collides[c] == STOPS or s.x[c, 0] > 0.0:
-            s.flies[g] = 0.0
-            s.hit[g] = 0.0 if s.collides[c] == STOPS else s.hit[g]
-    for b in range(s.hit.size):
-        g = root_of(s.parent, b) if s.y.size == 0 else 0
-        s.hit[b], s.flies[b] = s.hit[g], s.flies[g]
-
-
-@compiled
 def work_done(work: Any, s: StepArrays) -> float:
     """Work of the impulses behind free motion, J; those of contacts are added to the sums.
 
-    An impulse acts at the mean of the velocities before and behind it; what moved bodies without
-    contacts does work along the way that impulses add, ``trial``.
+    Forces of free motion do work along the means ``trial`` instead of ``path``. An impulse acts at
+    the mean of the velocities before and behind it; what contacts bear of the forces of a body that
+    they stop, at the velocity behind. Sums are the change of kinetic energy, but for errors of free
+    motion, and for how its path differs from that of even forces.
     """
     total, given = 0.0, 0.0
     for b in range(1, s.trial.shape[0]):
+        m, spin, mean, first = s.mass[b], s.spin[b], s.trial[b], s.hit[b]
+        forced, way, rest, curve = s.turned, s.turned[6:], s.turned[12:], s.turned[18:]
         for k in range(6):
-            way = s.trial[b, k]
-            if s.hit[b] < NOT_HIT:
-                way -= 0.5 * s.h * (s.before[b, k] + s.free[b, k] + s.h * work.pushed[b, k])
-            s.change[k], s.turned[k] = s.free[b, k] - s.before[b, k], way / s.h
-        total += product_of(s.change, s.turned, s.mass[b], s.spin[b])
-        if s.flies[b] == 0.0:
-            work.work_open += product_of(s.change, s.change, s.mass[b], s.spin[b])
-    for b in range(s.trial.shape[0]):
-        first = s.hit[b] if s.hit[b] <= 1.0 else 0.5
-        for k in range(6):
-            fall = (2.0 * first - 1.0) * (s.free[b, k] - s.before[b, k])
-            s.trial[b, k] = 0.5 * (s.before[b, k] + s.end[b, k] + fall)
+            before, end = s.before[b, k], s.end[b, k]
+            free = s.free[b, k] + s.h * work.pushed[b, k]
+            forced[k], way[k] = s.free[b, k] - before, mean[k] - s.path[b, k]
+            rest[k] = (end if first == NOT_HIT else before) - free
+            curve[k] = 0.5 * (before + free) - s.path[b, k]
+            mean[k] = 0.5 * (before + end)
+            if first != NOT_HIT:
+                mean[k] += (first - 0.5) * forced[k]
+        total += product_of(forced, way, m, spin) + product_of(rest, curve, m, spin)
+        if first != NOT_HIT:
+            given += (first - 0.5) * (1.0 - s.flies[b]) * product_of(forced, forced, m, spin)
     for c in range(s.contact_count):
         u0, u1, u2 = velocity_of(s, c, s.trial)
         pushed, rubbed = s.x[c, 0] * u0, s.x[c, 1] * u1 + s.x[c, 2] * u2

@@ -184,8 +184,7 @@ def _contacts(
     """What is left of contacts that are stepped, and of energy with what they take.
 
     Positions are moved by other rules than velocities, and so work is compared with potentials. By
-    their laws contacts take energy in each step. Bodies that stop are moved by what they have
-    behind it: twice what free motion would do by its change of velocity meanwhile is allowed for.
+    their laws contacts take energy in each step.
     """
     took, rubbed = found["contact_work"], found["friction_work"]
     words = f"work of friction {rubbed:.6g} J, of impacts {took - rubbed:.6g} J; that gained"
@@ -267,7 +266,6 @@ def _energy(
     absolute = float(np.max(floors["v"] * course.speed + floors["w"] * course.spin))
     allowed = _relative_limit(record) * (scale + absolute) + _rounding_of_rates(course, record)
     allowed += _rounding_at_rest(summary, course, record)
-    allowed += record.stepping.get("work_open", 0.0)
     return _entry(worst / scale, min(allowed / scale, MOST), "1", text)
 
 
