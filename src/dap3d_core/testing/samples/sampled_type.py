@@ -228,8 +228,7 @@ class SampledType:
                 if layout.states:
                     own = np.array(numbers(rng, layout.state_width))
                     if self.type.is_contact:  # it sticks, so that all of its rows hold
-                        way = np.zeros(3) if self.type.is_friction_alone() else own[1:4]
-                        own = np.array([STICKS, *way, 0.0, 0.0, 0.0])
+                        own = np.array([STICKS, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
                     state = attrs.evolve(state, own=own)
                 sample = Sample(self.kernels, element, state, grounded,
                                 f"pose {k + 1} off the manifold", self.seed)  # fmt: skip
