@@ -12,6 +12,7 @@ from dap3d_core.model import Model
 from dap3d_core.model.state_layout import STATE, VELOCITIES
 from dap3d_core.registry import PluginError
 from dap3d_core.registry.suggestions import some
+from dap3d_core.result.note import Note, information
 from dap3d_core.scene import Instance, Scene, ValidatedScene
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
@@ -70,6 +71,12 @@ def choose_method(model: Model, requested: str) -> tuple[str, str]:
     raise SimulationError(
         f"method {requested} does not fit: the scene has joints; use {usual} or auto"
     )
+
+
+def method_note(method: str, reason: str, requested: str) -> Note:
+    """The choice of a method: a warning where it is another one than was asked for."""
+    text = f"method {method}: {reason}"
+    return information(text) if requested in ("auto", method) else Note(text)
 
 
 def _method_of_breaks(model: Model, requested: str) -> tuple[str, str]:

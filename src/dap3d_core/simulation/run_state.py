@@ -39,6 +39,7 @@ from dap3d_core.scene import MISSING, Mistake, SceneError, Simulation
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event, check_every
 from dap3d_core.simulation.events.locate import EventLocator
+from dap3d_core.simulation.explain import method_note
 from dap3d_core.simulation.failure.monitors import CreepMonitor, UnilateralMonitor
 from dap3d_core.simulation.initial.tolerances import atol_notes, resolved_atol
 from dap3d_core.simulation.output.error_estimate import StepLimits, with_midpoints
@@ -264,7 +265,7 @@ class RunState:
         self.settings: Simulation = attrs.evolve(settings, atol=atol)
         self.times = report_times(settings.t_end, settings.dt)
         self.notes = [*compiled.notes, *settings_notes(compiled, settings)]
-        self.notes.append(f"method {compiled.method}: {compiled.reason}")
+        self.notes.append(method_note(compiled.method, compiled.reason, settings.method))
         if settings.step is None:
             self.notes += [
                 information(note) for note in atol_notes(settings.atol, atol, self.evaluator)

@@ -236,10 +236,10 @@ def check_fit(integrator: Integrator, formulation: Formulation) -> None:
         SimulationError: it requires accelerations that satisfy the constraints.
     """
     if formulation.has_own_coordinates and integrator.needs_body_coordinates:
+        other = 'contact = "events"' if integrator.steps_contacts else f"integrator {EXPLICIT.name}"
         raise SimulationError(
             f"integrator {integrator.name} does not fit method {formulation.name}: its equations "
-            f"are those of body coordinates; use method standard or auto, or integrator "
-            f"{EXPLICIT.name}"
+            f"are those of body coordinates; use method auto, or {other}"
         )
     if not fits(integrator, formulation):
         raise SimulationError(

@@ -216,8 +216,8 @@ class Ensemble:
 
     def _note(self, result: Result) -> str:
         """The warnings of a run that the scene as given does not have."""
-        known = {*self.compiled.notes, f"method {self.compiled.method}: {self.compiled.reason}"}
-        own = [n for n in warnings_of(result.notes) if not n.startswith("method ")]
+        known = self.compiled.notes
+        own = (n for n in warnings_of(result.notes) if not n.startswith("method "))
         return "; ".join(note for note in own if note not in known)
 
 

@@ -82,9 +82,13 @@ def run_data(result: "Result") -> dict[str, Any]:
 
 def _split_notes(data: dict[str, Any]) -> tuple[str, list[str]]:
     """The reason of the choice of the method, and the other notes."""
+    from dap3d_core.result.note import Note
+
     choice = f"method {data['method']}: "
-    reasons = [n.removeprefix(choice) for n in data["notes"] if n.startswith(choice)]
-    return reasons[0] if reasons else "", [n for n in data["notes"] if not n.startswith(choice)]
+    notes = list(map(Note, data["notes"]))
+    chosen = [note for note in notes if note.text.startswith(choice)][-1:]  # others are of its rows
+    others = [str(note) for note in notes if note not in chosen]
+    return chosen[0].text.removeprefix(choice) if chosen else "", others
 
 
 def _violations(data: dict[str, Any]) -> list[str]:

@@ -24,6 +24,7 @@ from dap3d_core.simulation.errors import (
     SimulationError,
     refuse_contacts,
 )
+from dap3d_core.simulation.explain import method_note
 from dap3d_core.simulation.failure.monitors import UnilateralMonitor
 from dap3d_core.simulation.initial_state import InitialState, start_notes
 from dap3d_core.simulation.kinematics.driver_coordinate import (
@@ -138,7 +139,8 @@ class _Kinematics:
     ) -> None:
         self.compiled, self.evaluator, self.settings = compiled, evaluator, settings
         self.times, self.coordinate = times, coordinate
-        self.notes = [*compiled.notes, f"method {compiled.method}: {compiled.reason}"]
+        note = method_note(compiled.method, compiled.reason, settings.method)
+        self.notes = [*compiled.notes, note]
         self.rows: list[Floats] = []
         self.paths: list[KinematicPath] = []
         self.started = time.perf_counter()
