@@ -72,7 +72,7 @@ class MoreauState(IntegrationState):
 class MoreauIntegration(Integration):
     """An initial value problem with contacts, in steps of equal length."""
 
-    name, adaptive = "moreau", False
+    name, adaptive, has_means = "moreau", False, True
     state_class = MoreauState
     loop = staticmethod(advance)
 

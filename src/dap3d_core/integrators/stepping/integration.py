@@ -129,6 +129,8 @@ class Integration(Restorable):
     contact_rows: Floats = np.zeros((0, 14))
     #: Whether programs of a scene's own may take the place of its functions.
     takes_programs = False
+    #: Whether ``complete`` adds means of the last step, which no later one knows.
+    has_means = False
 
     def __init__(
         self,

@@ -160,8 +160,9 @@ class StateView:
     @IGNORE_FLOAT_ERRORS
     def _quantity(self, name: str) -> Any:
         """Any quantity, of a report of this state."""
-        y, text = self._integration.work.state[Y], self._compiled.scene_text
-        result = instant_of(text, self._evaluator, self.t, y)
+        integration, text = self._integration, self._compiled.scene_text
+        y, complete = integration.work.state[Y], integration.complete
+        result = instant_of(text, self._evaluator, self.t, y, complete)
         values = result.quantity(name).values[0]
         self._is_placed = False
         return values if np.ndim(values) else float(values)

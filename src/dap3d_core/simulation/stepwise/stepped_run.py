@@ -15,6 +15,7 @@ from dap3d_core.formulations import REPORT
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators import Status
 from dap3d_core.integrators.stepping.hold import Hold, quick_view
+from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.integration_state import Y
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.arguments import checked
@@ -79,7 +80,7 @@ class SteppedRun:
         self._is_recorded, self._t_end = record, run.t_end
         integration = self._integration = run.present
         self._log = StateLog(
-            evaluator, integration.work.state[Y], self._inputs,
+            evaluator, integration, self._inputs,
             None if self._locator is None else self._locator.released,
         )  # fmt: skip
         self._attach()
@@ -195,7 +196,7 @@ class SteppedRun:
     def _attach(self) -> None:
         """Work with the present integration."""
         self._hold = Hold(self._run.present, self._evaluator.model.body_count)
-        self._log.attach(self._run.present.work.state[Y])
+        self._log.attach(self._run.present)
         self.state.attach(self._run.present)
 
     def _reach(self, end: float, budget: int | None = None) -> bool:
@@ -294,27 +295,34 @@ class StateLog:
     """
 
     def __init__(
-        self, evaluator: Evaluator, y: Floats, inputs: HeldInputs, released: ReleasedJoints | None
+        self,
+        evaluator: Evaluator,
+        integration: Integration,
+        inputs: HeldInputs,
+        released: ReleasedJoints | None,
     ) -> None:
-        """Args: the evaluator of the run, its integrated state, the inputs that act on it, and the
+        """Args: the evaluator of the run, its integration, the inputs that act on it, and the
         joints that have ended; None where none may.
         """
         self._evaluator, self._joints = evaluator, released
+        #: Reports of the rows, where forces are means of steps, which are not known later.
+        self._reports: list[Floats] = []
         self._ended: list[frozenset[str]] = []
         numbers = np.arange(len(evaluator.system.par))
         turns = [numbers[place] for place in evaluator.turn_places()]
         self._turns = np.concatenate(turns) if turns else numbers[:0]
         self._inputs = quick_view(inputs.present)
-        self._y_end = 1 + len(y)
+        self._y_end = 1 + len(integration.work.state[Y])
         self._end = self._y_end + len(inputs.values)
         self._width = self._end + len(self._turns)
         self.count = 0
         self._make_room(FIRST_ROWS)
-        self.attach(y)
+        self.attach(integration)
 
-    def attach(self, y: Floats) -> None:
-        """Keep the state y from here on."""
-        self._y = quick_view(y)
+    def attach(self, integration: Integration) -> None:
+        """Keep the states of an integration from here on."""
+        self._integration = integration
+        self._y = quick_view(integration.work.state[Y])
 
     def add(self, t: float) -> None:
         """Keep the present state, of time t."""
@@ -330,6 +338,10 @@ class StateLog:
             self._rows[self.count, self._end :] = self._evaluator.system.par[self._turns]
         if self._joints is not None:
             self._ended[self.count :] = [frozenset(self._joints.names)]
+        if self._integration.has_means:
+            row = self._report(self._rows[self.count])
+            self._integration.complete(row)
+            self._reports[self.count :] = [row]
         self.count += 1
 
     def _make_room(self, rows: int) -> None:
@@ -340,24 +352,35 @@ class StateLog:
         self._flat = quick_view(log.reshape(-1))
 
     @IGNORE_FLOAT_ERRORS
+    def _report(self, noted: Floats) -> Floats:
+        """A row t, y, report of a row of the log, with the present inputs."""
+        evaluator, y_end = self._evaluator, self._y_end
+        row = np.zeros(y_end + evaluator.report_size)
+        row[:y_end] = noted[:y_end]
+        evaluator.functions[REPORT](
+            float(noted[0]), noted[1:y_end].copy(), row[y_end:], evaluator.system, evaluator.loops
+        )
+        return row
+
     def reports(self) -> Floats:
         """Rows as a run reports them: accelerations and reactions are computed here."""
-        evaluator, log = self._evaluator, self._rows[: self.count]
-        y_end, end = self._y_end, self._end
+        evaluator, inputs = self._evaluator, self._rows[: self.count, self._y_end : self._end]
+        rows = self._reports[: self.count] or self._reports_of(inputs)
+        return evaluator.with_inputs(evaluator.body_rows(np.array(rows)), inputs)
+
+    def _reports_of(self, inputs: Floats) -> list[Floats]:
+        """The reports of all rows, with inputs (rows, inputs), turns and joints of their times."""
+        evaluator, rows = self._evaluator, []
         par, places = evaluator.system.par, self._turns
-        before, rows = par[places], np.zeros((len(log), y_end + evaluator.report_size))
+        before = par[places]
         with evaluator.held_inputs():
-            for k, (row, noted) in enumerate(zip(rows, log, strict=True)):
+            for k, noted in enumerate(self._rows[: self.count]):
                 if self._joints is not None:
                     self._joints.let_end(self._ended[k])
-                row[:y_end] = noted[:y_end]
-                evaluator.set_inputs(noted[y_end:end])
-                par[places] = noted[end:]
-                evaluator.functions[REPORT](
-                    float(noted[0]), noted[1:y_end].copy(), row[y_end:], evaluator.system,
-                    evaluator.loops,
-                )  # fmt: skip
+                evaluator.set_inputs(inputs[k])
+                par[places] = noted[self._end :]
+                rows.append(self._report(noted))
         par[places] = before
         if self._joints is not None:
             self._joints.let_end(self._ended[-1])
-        return evaluator.with_inputs(evaluator.body_rows(rows), log[:, y_end:end])
+        return rows

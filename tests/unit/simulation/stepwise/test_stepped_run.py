@@ -214,3 +214,26 @@ def test_threads_take_turns_in_a_run():
     found, wanted = shared.result(), alone.result()
     np.testing.assert_array_equal(found.t, wanted.t)
     np.testing.assert_array_equal(found.u, wanted.u)
+
+
+@long_in_plain_python
+def test_forces_of_stepped_contacts_are_those_of_the_steps():
+    """A block of 2 kg that rests bears its weight: in the state, in the record, and to a law.
+
+    They are means of steps, which no state tells.
+    """
+    scene, weight, seen = pushed_block(r=(0.0, 0.0, 0.1)), 2.0 * 9.81, []
+    scene.add_force("weight", "weight")
+    scene.add_contact("ball_plane", "floor", P_i="block.O", radius=0.1, mu=0.5)
+    run = dap.start(scene, contact="stepping", contact_step=1e-3)
+    for _ in range(3):
+        run.step(0.01)
+        assert run.state["floor.normal"] == pytest.approx(weight, rel=1e-9)
+    result = run.result()
+    assert result.contact("floor").normal_force == pytest.approx(np.full(4, weight), rel=1e-9)
+    assert np.max(np.abs(result.rdd)) < 1e-9
+    law = dap.Controller(
+        every=0.01, update=lambda t, state: seen.append(state["floor.normal"]) or {}
+    )
+    dap.simulate(scene, t_end=0.03, contact="stepping", contact_step=1e-3, controllers=[law])
+    assert seen == pytest.approx([weight] * 3, rel=1e-9)
