@@ -23,7 +23,7 @@ from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators.moreau.arrays import all_room, grown
 from dap3d_core.integrators.moreau.contact_set import POINTS
 from dap3d_core.integrators.moreau.free_motion import MOST_PARTS, PART
-from dap3d_core.integrators.moreau.impulses import put_means
+from dap3d_core.integrators.moreau.impulses import log_contacts, put_means
 from dap3d_core.integrators.moreau.problem import arrays_of
 from dap3d_core.integrators.moreau.step import FOLLOWED, MOST_STEPS, START_ALONE, advance
 from dap3d_core.integrators.stepping.integration import Integration
@@ -142,6 +142,14 @@ class MoreauIntegration(Integration):
             self._arrays.stage = START_ALONE
             self._advance(0)
         self.call(put_means, self.work, self._arrays, row)
+
+    def contacts_at(self, t: float) -> Floats:
+        """As ``Integration.contacts_at``."""
+        arrays = self._arrays
+        self.call(log_contacts, self.work, arrays, t)
+        found: Floats = arrays.log[: arrays.log_count].copy()
+        arrays.log_count = 0
+        return found
 
     @property
     def contact_rows(self) -> Floats:  # type: ignore[override]

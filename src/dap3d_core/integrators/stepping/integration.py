@@ -299,6 +299,10 @@ class Integration(Restorable):
     def complete(self, row: Floats) -> None:
         """Add to a row t, y, report of now what else is known of it: here nothing."""
 
+    def contacts_at(self, t: float) -> Floats:
+        """(k, 14) contacts of shapes now, at time t, as rows of ``contact_rows``: here none."""
+        return self.contact_rows[:0]
+
     def end(self) -> None:
         """End the run here: the next ``advance`` reports this state, and stops."""
         self.work.end_status = Status.ENDED

@@ -20,6 +20,7 @@ from dap3d_core.integrators.stepping.integration_state import Y
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result
+from dap3d_core.result.contact_table import ContactTable, no_contacts
 from dap3d_core.scene import Scene
 from dap3d_core.settings import StepSettings
 from dap3d_core.simulation.compiled_model import CompiledModel
@@ -186,6 +187,8 @@ class SteppedRun:
             record = attrs.evolve(record, settings=record.settings | more)
             log.add(t)
             rows = log.reports()
+            if (shapes := self._evaluator.model.collisions) is not None:
+                record = attrs.evolve(record, contacts=log.contacts(shapes.names))
             log.count -= 1
             return Result.of_run(
                 self._evaluator.model, rows, record, lambda: self.compiled.evaluator
@@ -305,8 +308,10 @@ class StateLog:
         joints that have ended; None where none may.
         """
         self._evaluator, self._joints = evaluator, released
-        #: Reports of the rows, where forces are means of steps, which are not known later.
+        #: Reports of the rows, and contacts of shapes, where forces are means of steps, which are
+        #: not known later.
         self._reports: list[Floats] = []
+        self._contacts: list[Floats] = []
         self._ended: list[frozenset[str]] = []
         numbers = np.arange(len(evaluator.system.par))
         turns = [numbers[place] for place in evaluator.turn_places()]
@@ -342,6 +347,7 @@ class StateLog:
             row = self._report(self._rows[self.count])
             self._integration.complete(row)
             self._reports[self.count :] = [row]
+            self._contacts[self.count :] = [self._integration.contacts_at(t)]
         self.count += 1
 
     def _make_room(self, rows: int) -> None:
@@ -367,6 +373,11 @@ class StateLog:
         evaluator, inputs = self._evaluator, self._rows[: self.count, self._y_end : self._end]
         rows = self._reports[: self.count] or self._reports_of(inputs)
         return evaluator.with_inputs(evaluator.body_rows(np.array(rows)), inputs)
+
+    def contacts(self, shapes: tuple[str, ...]) -> ContactTable:
+        """Contacts of shapes, by their names, at the times of the rows."""
+        found = self._contacts[: self.count]
+        return ContactTable.of_rows(shapes, np.concatenate(found)) if found else no_contacts()
 
     def _reports_of(self, inputs: Floats) -> list[Floats]:
         """The reports of all rows, with inputs (rows, inputs), turns and joints of their times."""

@@ -237,3 +237,24 @@ def test_forces_of_stepped_contacts_are_those_of_the_steps():
     )
     dap.simulate(scene, t_end=0.03, contact="stepping", contact_step=1e-3, controllers=[law])
     assert seen == pytest.approx([weight] * 3, rel=1e-9)
+
+
+@long_in_plain_python
+def test_contacts_of_shapes_are_tabled_at_the_end_of_each_step():
+    """As in a run that reports there, and anew after a reset."""
+    scene = dap.Scene(name="ball")
+    scene.add_body("ball", mass=2.0, Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 0.101))
+    scene.add_force("weight", "weight")
+    scene.add_shape("sphere", body="ball", radius=0.1, collides=True)
+    scene.add_shape("plane", body="ground", collides=True)
+    scene.add_collisions()
+    wanted = dap.simulate(scene, t_end=0.1, dt=0.02, contact="stepping").contacts
+    run = dap.start(scene, contact="stepping")
+    for _ in range(2):
+        for _ in range(5):
+            run.step(0.02)
+        found = run.result().contacts
+        assert len(found) == len(wanted) == 5
+        assert found.t == pytest.approx(wanted.t)
+        assert found.force == pytest.approx(wanted.force, rel=1e-9)
+        run.reset()
