@@ -66,7 +66,7 @@ def check_run(case, result):
     """A run to its end, with a note that has all words, or without any."""
     assert result.status == "done"
     check_finite(result)
-    usual = ("method ", information("initial velocities corrected"))
+    usual = (information("method "), information("initial velocities corrected"))
     if case.comes == "allowed":
         assert [n for n in result.notes if not n.startswith(usual)] == []
         return

@@ -236,7 +236,8 @@ def check_fit(integrator: Integrator, formulation: Formulation) -> None:
         SimulationError: it requires accelerations that satisfy the constraints.
     """
     if formulation.has_own_coordinates and integrator.needs_body_coordinates:
-        other = 'contact = "events"' if integrator.steps_contacts else f"integrator {EXPLICIT.name}"
+        other = f"integrator {EXPLICIT.name}"
+        other += ' with contact = "events"' if integrator.steps_contacts else ""
         raise SimulationError(
             f"integrator {integrator.name} does not fit method {formulation.name}: its equations "
             f"are those of body coordinates; use method auto, or {other}"

@@ -164,7 +164,8 @@ def test_the_explanation_has_the_tree():
 
 def test_stepping_says_that_it_keeps_body_coordinates():
     """It is refused, with what fits."""
-    with pytest.raises(dap.SimulationError, match="body coordinates; use method standard"):
+    words = 'use method auto, or integrator dop853 with contact = "events"'
+    with pytest.raises(dap.SimulationError, match=words):
         dap.simulate("pen1", t_end=0.1, dt=0.1, step=1e-3, method="joint", integrator="moreau")
 
 
