@@ -4,7 +4,6 @@ import gc
 import os
 import signal
 from collections import defaultdict
-from pathlib import Path
 from zlib import crc32
 
 import pytest
@@ -22,18 +21,8 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection(session):
     gc.disable()  # nothing that is imported or collected is garbage
-    collect_from_the_end(session.config)
     if session.config.option.markexpr != "long":
         keep_unoptimised()
-
-
-def collect_from_the_end(config):
-    """Let every other worker collect backwards: what it has rewritten for pytest by the middle, the
-    others find there, and it what they have. All sort what they find."""
-    number = os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")
-    if int(number) % 2 and config.args_source == config.ArgsSource.TESTPATHS:
-        files = (file for path in config.args for file in Path(path).rglob("test_*.py"))
-        config.args = sorted(map(str, files), reverse=True)
 
 
 def keep_unoptimised():
@@ -73,7 +62,6 @@ def pytest_collection_modifyitems(items):
     """Of the cases of a verification the quick tests take the first, of `every(n)` each n-th, of
     any other test that has more than five each fifth. Of those that they leave CI verifies all, of
     `thinned(n)` one of n, without order: each n-th would have the same value of some parameter."""
-    items.sort(key=lambda item: item.path)
     cases = defaultdict(list)
     for item in items:
         if not item.get_closest_marker("slow"):
