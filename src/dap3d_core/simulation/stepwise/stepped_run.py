@@ -347,7 +347,8 @@ class StateLog:
             row = self._report(self._rows[self.count])
             self._integration.complete(row)
             self._reports[self.count :] = [row]
-            self._contacts[self.count :] = [self._integration.contacts_at(t)]
+            if self._evaluator.model.collisions is not None:
+                self._contacts[self.count :] = [self._integration.contacts_at(t)]
         self.count += 1
 
     def _make_room(self, rows: int) -> None:
