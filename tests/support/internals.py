@@ -143,10 +143,9 @@ from dap3d_core.scene.expressions.expression import (
     ExpressionError,
     parse_expression,
 )
-from dap3d_core.scene.files.line_numbers import lines_of
 from dap3d_core.scene.files.read_toml import LARGEST_FILE, group_of, scene_of
 from dap3d_core.scene.tables import HEADER_KEYS, NAMED, TABLES, Animation, Element, fault_of_name
-from dap3d_core.scene.validate.mistake_collector import Collector
+from dap3d_core.scene.validate.mistake_collector import Collector, lines_of
 from dap3d_core.settings import FIXED_STEP, INTEGRATORS, METHODS
 from dap3d_core.simulation.checkpoint.save import (
     FORMAT,

@@ -5,7 +5,7 @@ import pytest
 from support.internals import ContactTable
 
 import dap3d_core as dap
-from dap3d_core.linear.inverse import invert
+from dap3d_core.linear.least_squares import invert
 from dap3d_core.simulation import CompiledModel
 
 G, MU, MASS, HEIGHT = 9.81, 0.3, 2.0, 0.05
