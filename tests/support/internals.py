@@ -21,7 +21,7 @@ from dap3d_core.formulations.contacts.contact_table import ContactTable
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.pivots import near_singular_rows, store_reference_pivots
 from dap3d_core.formulations.programs import change_over, scene_program
-from dap3d_core.integrators.adams import formulas
+from dap3d_core.integrators.adams import step as adams
 from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.radau.tableau import COEFFICIENTS, MOST_STAGES, STAGES, radau_method
 from dap3d_core.integrators.stepping.integration import Refusals, off_constraints
