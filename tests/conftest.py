@@ -100,7 +100,6 @@ def cache_of_libraries(tmp_path_factory):
 def quick_libraries(monkeypatch, cache_of_libraries):
     """Export unoptimised code, which has the same bits and is made in a hundredth of the time."""
     from dap3d_core.kernels.compiler import objects
-    from dap3d_core.native import build
 
-    monkeypatch.setattr(build, "OPTIMISED", objects.UNOPTIMISED)
-    monkeypatch.setattr(build, "cache_folder", lambda: cache_of_libraries)
+    monkeypatch.setattr("dap3d_core.native.build.OPTIMISED", objects.UNOPTIMISED)
+    monkeypatch.setattr("dap3d_core.native.build.cache_folder", lambda: cache_of_libraries)

@@ -5,7 +5,7 @@ from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.file.atomic_write import check_target
 from dap3d_core.result.file.write import ResultWriter
 from dap3d_core.result.metadata import RunMetadata, RunStatistics, current_versions
-from dap3d_core.result.note import Note, information
+from dap3d_core.result.note import Note, information, warnings_of
 from dap3d_core.result.open import open_result
 from dap3d_core.result.post.force_output import Reaction
 from dap3d_core.result.post.global_error import ErrorEstimate, estimated_error
@@ -37,4 +37,5 @@ __all__ = [
     "information",
     "names_of",
     "open_result",
+    "warnings_of",
 ]

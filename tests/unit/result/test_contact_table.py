@@ -9,7 +9,6 @@ from support.ended import leave, shorten_chunks
 import dap3d_core as dap
 from dap3d_core.result import UnknownNameError
 from dap3d_core.result.contact_table import FIELDS
-from dap3d_core.view.page_data import page_data
 
 G = 9.81
 GIVEN = {"t_end": 0.4, "dt": 0.1, "contact_step": 5e-3}
@@ -74,7 +73,7 @@ def test_a_run_that_is_resumed_has_the_whole_table(result, tmp_path, monkeypatch
 
 
 def test_a_page_has_an_arrow_for_each_pair(result):
-    arrows = page_data(result, stack(), [], None)["arrows"]
+    arrows = dap.view(result).data["arrows"]
     (floor,) = [a for a in arrows if set(a["name"].split(" on ")) == {"floor", "a_ball"}]
     values = np.frombuffer(base64.b64decode(floor["values"]), dtype="<f4").reshape(-1, 3)
     assert values == pytest.approx(result.contacts.of("a_ball", "floor").force, rel=1e-6)

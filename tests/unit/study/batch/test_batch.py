@@ -10,7 +10,6 @@ import dap3d_core as dap
 from dap3d_core.model.model import ReferencePoses
 from dap3d_core.study import Ensemble, PointStatus, Study, outputs_of, with_values
 from dap3d_core.study.batch import driver
-from dap3d_core.study.batch.batch import ModelRebuilder
 from dap3d_core.study.batch.parameter_map import ParameterMap, dependence_of
 
 DONE, STOPPED, FAILED = PointStatus.DONE, PointStatus.STOPPED, PointStatus.FAILED
@@ -249,7 +248,7 @@ def test_numbers_that_are_copied_need_no_check_and_no_model(monkeypatch):
     def refuse(*args):
         raise AssertionError("a model was made")
 
-    monkeypatch.setattr(ModelRebuilder, "load", refuse)
+    monkeypatch.setattr("dap3d_core.study.batch.batch.ModelRebuilder.load", refuse)
     monkeypatch.setattr(Ensemble, "result", refuse)
     assert of.run([[1.5], [2.0]]).status.tolist() == [DONE, DONE]
 

@@ -7,13 +7,11 @@ import attrs
 import numpy as np
 import pytest
 import xarray
-from support.internals import free_space
 from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.cli.console import sweep_tables
 from dap3d_core.result import ResultError, current_versions
-from dap3d_core.study.sweep import file as growing
 from dap3d_core.study.sweep import sweep
 
 #: Rest length and start of the spring below, m.
@@ -270,7 +268,7 @@ def test_notes_survive(tmp_path, one_by_one):
 
 
 def test_a_part_may_be_read_while_it_grows(tmp_path, one_by_one, monkeypatch):
-    monkeypatch.setattr(growing, "EVERY", 0.0)
+    monkeypatch.setattr("dap3d_core.study.sweep.file.EVERY", 0.0)
     seen = []
 
     def look(done, total):
@@ -428,8 +426,8 @@ def test_mistakes_are_reported_together(changes, keys, words):
 
 def test_a_sweep_without_room_is_refused(monkeypatch, tmp_path):
     """In memory and on the disk, with figures; force begins it all the same."""
-    monkeypatch.setattr(free_space, "_free_memory", lambda: 2**20)
-    monkeypatch.setattr(free_space, "_free_disk", lambda folder: 2**20)
+    monkeypatch.setattr("dap3d_core.simulation.output.free_space._free_memory", lambda: 2**20)
+    monkeypatch.setattr("dap3d_core.simulation.output.free_space._free_disk", lambda folder: 2**20)
     vary = {"forces.spring.k": "1:2:20001"}
     options = dict(outputs="block.r.x:series", t_end=0.1, dt=0.1 / 1000)
     with pytest.raises(dap.SceneError, match=r"20,001 points .* in memory"):
