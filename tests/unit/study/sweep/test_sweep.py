@@ -12,7 +12,7 @@ from support.plain import jit_is_on
 import dap3d_core as dap
 from dap3d_core.cli.console import sweep_tables
 from dap3d_core.result import ResultError, current_versions
-from dap3d_core.study.sweep import sweep
+from dap3d_core.study import Ensemble
 
 #: Rest length and start of the spring below, m.
 LENGTH, START = 1.0, 1.25
@@ -50,7 +50,7 @@ def one_by_one(monkeypatch):
             ran.append(int(place))
             yield np.array([place]), ensemble.run(points[[place]])
 
-    monkeypatch.setattr(sweep, "run_here", run_here)
+    monkeypatch.setattr("dap3d_core.study.sweep.sweep.run_here", run_here)
     return ran
 
 
@@ -441,14 +441,13 @@ def test_a_sweep_without_room_is_refused(monkeypatch, tmp_path):
 def test_whole_numbers_stay_whole(monkeypatch):
     """Of a field that is one (of teeth, say): halves and ranges that are sampled are refused."""
     scene = spring()
-    plain = sweep.Ensemble
 
     def with_whole(study, announce=None):
-        ensemble = plain(study, announce)
+        ensemble = Ensemble(study, announce)
         ensemble.parameters = tuple(attrs.evolve(p, whole=True) for p in ensemble.parameters)
         return ensemble
 
-    monkeypatch.setattr(sweep, "Ensemble", with_whole)
+    monkeypatch.setattr("dap3d_core.study.sweep.sweep.Ensemble", with_whole)
     for spec, sample in (("1:2:3", None), ("1:4", 2)):
         with pytest.raises(dap.SceneError, match="this is a whole number; list whole values"):
             dap.sweep(scene, {"forces.spring.k": spec}, outputs="block.r.x", sample=sample, **TIMES)
