@@ -158,6 +158,7 @@ from dap3d_core.simulation.equilibrium.search import held_solution, trust_region
 from dap3d_core.simulation.events import contact_jumps
 from dap3d_core.simulation.initial.assemble import correct_initial
 from dap3d_core.simulation.output import free_space
+from dap3d_core.simulation.settings import integration_options
 from dap3d_core.study.sweep.dataset import evenly, is_sweep
 from dap3d_core.testing import packages
 from dap3d_core.testing.samples.sampled_type import own_values, sampled_types, with_functions
