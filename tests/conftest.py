@@ -99,8 +99,5 @@ def cache_of_libraries(tmp_path_factory):
 @pytest.fixture
 def quick_libraries(monkeypatch, cache_of_libraries):
     """Export unoptimised code, which has the same bits and is made in a hundredth of the time."""
-    from dap3d_core.kernels.compiler import objects
-    from dap3d_core.native import build
-
-    monkeypatch.setattr(build, "OPTIMISED", objects.UNOPTIMISED)
-    monkeypatch.setattr(build, "cache_folder", lambda: cache_of_libraries)
+    monkeypatch.setattr("dap3d_core.native.build.OPTIMISED", 0)
+    monkeypatch.setattr("dap3d_core.native.build.cache_folder", lambda: cache_of_libraries)

@@ -275,11 +275,7 @@ def drake():
         DiscreteContactApproximation,
     )
     from pydrake.multibody.tree import SpatialInertia, UnitInertia
-    from pydrake.systems.analysis import (
-        ApplySimulatorConfig,
-        Simulator,
-        SimulatorConfig,
-    )
+    from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
     from pydrake.systems.framework import DiagramBuilder
 
     corner = 1e-3  # m, radius of a ball in a corner

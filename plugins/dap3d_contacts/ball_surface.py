@@ -2,16 +2,7 @@
 
 import math
 
-from dap3d_core.interface import (
-    REQUIRED,
-    Contact,
-    Point,
-    choice,
-    function,
-    hookimpl,
-    number,
-    point,
-)
+from dap3d_core.interface import REQUIRED, Contact, Point, choice, function, hookimpl, number, point
 from dap3d_core.kernels import add, root, rotate, scale, sqrt, sub, transpose, where
 
 interface_version = 1

@@ -6,15 +6,7 @@ from typing import ClassVar
 
 from dap3d_contacts.ball_surface import LEFT, seen_from
 from dap3d_contacts.curve_samples import SAMPLES, Curve
-from dap3d_core.interface import (
-    Contact,
-    Point,
-    choice,
-    function,
-    hookimpl,
-    number,
-    point,
-)
+from dap3d_core.interface import Contact, Point, choice, function, hookimpl, number, point
 from dap3d_core.kernels import add, atan2, cos, dot, root, rotate, scale, sin, sqrt, sub, where
 
 interface_version = 1

@@ -6,14 +6,7 @@ from dap3d_core.interface import hookimpl
 from dap3d_core.kernels import by_body, cable_length, cable_rate, cable_spans, cross, scale
 from dap3d_forces.actuator import kept
 from dap3d_forces.bounds import within
-from dap3d_forces.tendon_law import (
-    TendonLaw,
-    activated,
-    contracted,
-    numbers_of,
-    passive,
-    stored,
-)
+from dap3d_forces.tendon_law import TendonLaw, activated, contracted, numbers_of, passive, stored
 from dap3d_joints.tendon import Route, pulls_of
 
 interface_version = 1

@@ -9,7 +9,6 @@ from support.levels import quickly
 
 import dap3d_core as dap
 from dap3d_core.cli import main
-from dap3d_core.cli.framework.command import Command
 
 from .conftest import COMMAND, environment
 
@@ -173,7 +172,7 @@ def test_ctrl_c_while_options_are_parsed_is_an_interruption(monkeypatch, capfd):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Command, "parse_args", interrupted)
+    monkeypatch.setattr("dap3d_core.cli.framework.command.Command.parse_args", interrupted)
     assert main(["models"]) == 130
     assert capfd.readouterr().err.strip() == "interrupted"
 

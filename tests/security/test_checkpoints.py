@@ -13,7 +13,7 @@ from support.internals import (
     Checkpoint,
     IntegrationState,
     RadauState,
-    formulas,
+    adams,
     read_checkpoint,
     write_checkpoint,
 )
@@ -29,7 +29,7 @@ def crafted(run, what, where, value):
     return check_change(json.dumps(["checkpoint", run, what, where, value]).encode())
 
 
-INTEGERS = RadauState.indices("integer") | formulas.AdamsState.indices("integer")
+INTEGERS = RadauState.indices("integer") | adams.AdamsState.indices("integer")
 #: Integers that only count, and so hold any count.
 COUNTS = {
     "step_count", "rejected_count", "rhs_count", "projection_count", "report_count",
@@ -68,7 +68,7 @@ def test_the_command_refuses_it_as_any_damaged_file(tmp_path, capsys):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("run", "state"),
-    [("pen1", IntegrationState), ("adams", formulas.AdamsState), ("radau", RadauState)],
+    [("pen1", IntegrationState), ("adams", adams.AdamsState), ("radau", RadauState)],
 )
 def test_every_integer_that_is_no_count_is_limited(run, state, tmp_path):
     """In one process, which a file that is not refused would end, or make fail."""

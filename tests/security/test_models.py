@@ -8,7 +8,6 @@ from support.internals import source_files
 from support.process import REPOSITORY
 
 import dap3d_core as dap
-from dap3d_core.interface.formats import xml_tree
 
 ARM = (REPOSITORY / "tests" / "data" / "formats" / "arm.urdf").read_text()
 BOX = '<box size="1 0.1 0.1"/>'
@@ -45,7 +44,7 @@ def test_a_document_type_is_refused(tmp_path, head, name):
 def test_deep_and_many_elements_are_refused(tmp_path, monkeypatch):
     deep = "<robot>" + "<a>" * 100_000
     assert "nested 200 deep" in refusal(tmp_path / "a.urdf", deep)
-    monkeypatch.setattr(xml_tree, "MOST_ELEMENTS", 1000)
+    monkeypatch.setattr("dap3d_core.interface.formats.xml_tree.MOST_ELEMENTS", 1000)
     many = "<robot>" + "<a/>" * 1000 + "</robot>"
     assert "more than 1000 elements" in refusal(tmp_path / "a.urdf", many)
 

@@ -8,7 +8,6 @@ import pytest
 
 import dap3d_core as dap
 from dap3d_core.cli import main
-from dap3d_core.plot.film.stick_figure import sticks_of
 from dap3d_core.result import ResultError
 from dap3d_core.result.file.validate import ALWAYS, check_shapes
 
@@ -118,9 +117,7 @@ def test_the_scene_in_a_result(changed, tmp_path, monkeypatch, capfd, text):
         said = capfd.readouterr().err
         assert code in (0, 2), (words, said)
         assert "unexpected" not in said
-    figure = sticks_of(dap.open(path))  # what films and plots read of it
-    assert figure.names == ("stone", "ball")
-    assert figure.limits is None
+    assert dap.animate(dap.open(path), tmp_path / "a.png", at=0.0).frames == 1
 
 
 def test_names_and_indices_that_lead_nowhere(changed):
@@ -146,18 +143,17 @@ def test_numbers_that_cannot_be_shown(changed, tmp_path, monkeypatch, capfd, val
     assert "unexpected" not in capfd.readouterr().err
 
 
-def test_completion_offers_no_words_that_a_shell_would_run(changed, monkeypatch):
+def test_completion_offers_no_words_that_a_shell_would_run(changed, monkeypatch, capsys):
     """Shells put what is offered on the command line as it stands."""
-    import click
-
-    from dap3d_core.cli.framework.completion import quantities
-
+    monkeypatch.setenv("_DAP3D_COMPLETE", "bash_complete")
+    monkeypatch.setenv("COMP_CWORD", "3")
     for name in ("x;touch pwned;", "$(touch pwned)", "`a`", "a b", "'", '"', "|a", "-o=x", ">x"):
         path = changed(lambda d, n=name: d["body"].__setitem__(0, n))
         assert dap.open(path).summary.body_names[0] == name
-        ctx = click.Context(click.Command("plot"))
-        ctx.params = {"result": str(path)}
-        offered = [str(getattr(w, "value", w)) for w in quantities(ctx, None, "")]
+        monkeypatch.setenv("COMP_WORDS", f"dap3d plot {path} ")
+        with pytest.raises(SystemExit):
+            main([])
+        offered = [word.removeprefix("plain,") for word in capsys.readouterr().out.splitlines()]
         assert not [w for w in offered if name in w]
         assert [w for w in offered if w.startswith("ball")]
 

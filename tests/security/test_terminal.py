@@ -84,13 +84,11 @@ def test_mistakes_of_a_scene_are_plain_text(say, tmp_path):
 def test_warnings_of_libraries_are_plain_text(say, monkeypatch):
     import warnings
 
-    import dap3d_core.cli.commands.models as command
-
     def warn(folder):
         warnings.warn("glyph \x1b[31m\nno mistakes found", stacklevel=1)
         return {"group": "", "bodies": 0, "joints": {}, "description": "", "own_types": False}
 
-    monkeypatch.setattr(command, "_data", warn)
+    monkeypatch.setattr("dap3d_core.cli.commands.models._data", warn)
     with warnings.catch_warnings():
         warnings.simplefilter("always")
         code, _, err = say("models")

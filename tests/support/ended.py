@@ -1,7 +1,6 @@
 """Runs that are ended on their way, and leave a checkpoint."""
 
 import math
-from importlib import import_module
 
 import pytest
 
@@ -14,9 +13,8 @@ class EndedError(Exception):
 
 def shorten_chunks(monkeypatch):
     """As many chunks as there are steps."""
-    run = import_module("dap3d_core.simulation.run")
-    monkeypatch.setattr(run, "CHUNK_SECONDS", 1e-9)
-    monkeypatch.setattr(run, "FIRST_CHUNK", 1)
+    monkeypatch.setattr("dap3d_core.simulation.run.CHUNK_SECONDS", 1e-9)
+    monkeypatch.setattr("dap3d_core.simulation.run.FIRST_CHUNK", 1)
 
 
 def ended_at(t):

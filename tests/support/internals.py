@@ -21,7 +21,7 @@ from dap3d_core.formulations.contacts.contact_table import ContactTable
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.pivots import near_singular_rows, store_reference_pivots
 from dap3d_core.formulations.programs import change_over, scene_program
-from dap3d_core.integrators.adams import formulas
+from dap3d_core.integrators.adams import step as adams
 from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.radau.tableau import COEFFICIENTS, MOST_STAGES, STAGES, radau_method
 from dap3d_core.integrators.stepping.integration import Refusals, off_constraints
@@ -143,10 +143,9 @@ from dap3d_core.scene.expressions.expression import (
     ExpressionError,
     parse_expression,
 )
-from dap3d_core.scene.files.line_numbers import lines_of
 from dap3d_core.scene.files.read_toml import LARGEST_FILE, group_of, scene_of
 from dap3d_core.scene.tables import HEADER_KEYS, NAMED, TABLES, Animation, Element, fault_of_name
-from dap3d_core.scene.validate.mistake_collector import Collector
+from dap3d_core.scene.validate.mistake_collector import Collector, lines_of
 from dap3d_core.settings import FIXED_STEP, INTEGRATORS, METHODS
 from dap3d_core.simulation.checkpoint.save import (
     FORMAT,
@@ -159,7 +158,7 @@ from dap3d_core.simulation.equilibrium.search import held_solution, trust_region
 from dap3d_core.simulation.events import contact_jumps
 from dap3d_core.simulation.initial.assemble import correct_initial
 from dap3d_core.simulation.output import free_space
-from dap3d_core.simulation.redundancy import redundancy
+from dap3d_core.simulation.settings import integration_options
 from dap3d_core.study.sweep.dataset import evenly, is_sweep
 from dap3d_core.testing import packages
 from dap3d_core.testing.samples.sampled_type import own_values, sampled_types, with_functions

@@ -147,6 +147,15 @@ def slider_crank(a=0.1, b=0.35, offset=0.02):
     return OneFreedom(poses, masses, inertias)
 
 
+def driven(scene, coefficients):
+    """A scene whose crank turns by a polynomial of time, under its weight."""
+    scene.add_function("a", "turning", coeff=coefficients)
+    scene.add_vector("back", body="ground", sp=[0.0, -1.0, 0.0])  # q grows about it
+    scene.add_joint("drive-rot", "motor", body_i="crank", a_j="back", function="turning")
+    scene.add_force("weight", "gravity")
+    return scene
+
+
 def slider_crank_scene(q, coefficients, a=0.1, b=0.35, offset=0.02):
     """The same as a scene, its crank driven by f = c1 + c2 t + c3 t^2 more than q."""
     scene = dap.Scene(name="slider-crank")
@@ -159,11 +168,7 @@ def slider_crank_scene(q, coefficients, a=0.1, b=0.35, offset=0.02):
     scene.add_joint("cyl", "crank_pin", P_i="B_rod", P_j="B", a_i="rod.y", a_j="crank.y")
     scene.add_joint("sph", "wrist", P_i="C_rod", P_j="slider.O")
     scene.add_joint("tran", "way", P_i="slider.O", P_j="guide", a_j="ground.x")
-    scene.add_function("a", "turning", coeff=coefficients)
-    scene.add_vector("back", body="ground", sp=[0.0, -1.0, 0.0])  # q grows about it
-    scene.add_joint("drive-rot", "motor", body_i="crank", a_j="back", function="turning")
-    scene.add_force("weight", "gravity")
-    return scene
+    return driven(scene, coefficients)
 
 
 # ---------------------------------------------------------------------------- four-bar
@@ -205,11 +210,7 @@ def four_bar_scene(q, coefficients, a=0.2, b=0.5, c=0.4, d=0.6):
         first, second = (end.partition("_")[0].partition(".")[0] for end in (i, j))
         second = "ground" if second == "post" else second
         scene.add_joint("rev", name, P_i=i, P_j=j, a_i=f"{first}.y", a_j=f"{second}.y")
-    scene.add_function("a", "turning", coeff=coefficients)
-    scene.add_vector("back", body="ground", sp=[0.0, -1.0, 0.0])  # q grows about it
-    scene.add_joint("drive-rot", "motor", body_i="crank", a_j="back", function="turning")
-    scene.add_force("weight", "gravity")
-    return scene
+    return driven(scene, coefficients)
 
 
 # ---------------------------------------------------------------------------- double wishbone

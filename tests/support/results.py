@@ -1,5 +1,6 @@
 """Results of closed-form motions, without a run, and comparison of results."""
 
+import attrs
 import numpy as np
 
 import dap3d_core as dap
@@ -126,3 +127,10 @@ def grown(path, result, *, most=None, force=False):
     """A writer for as many rows as a result has."""
     most = len(result.t) if most is None else most
     return ResultWriter(path, result.summary, result.record, most, force=force)
+
+
+def without_turns(result):
+    """A result as older programs left it, which did not store the angles that a run counts."""
+    summary = attrs.evolve(result.summary, angle_count=0, angle_names=())
+    arrays = attrs.evolve(result.arrays, angles=np.zeros((len(result.t), 0)))
+    return dap.Result(summary, arrays, result.record, lambda: None)

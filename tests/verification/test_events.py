@@ -6,11 +6,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from support.contact import contact_registry
-from support.internals import LOGGED
+from support.internals import LOGGED, integration_options
 
 import dap3d_core as dap
-from dap3d_core.formulations.switches import effects_of
-from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
+from dap3d_core.integrators import INTEGRATORS, Status
 
 TIGHT = {"rtol": 1e-12, "atol": 1e-14}
 G = 9.81
@@ -84,14 +83,12 @@ def test_a_run_is_the_same_however_it_is_cut(registry, integrator):
     """Bit for bit: all that decides where a step ends lies in the arrays of the integration."""
     ends = []
     for budget in (1, 7, 10**9):
-        evaluator = bouncing(registry).evaluator
-        u0 = evaluator.model.u0
+        compiled = bouncing(registry)
+        evaluator, u0 = compiled.evaluator, compiled.model.u0
         evaluator.start(0.0, u0)
-        y0 = evaluator.integrated(u0)
-        integration = RungeKutta(
-            TABLEAUS[integrator], evaluator.functions, evaluator.system, evaluator.loops, y0,
-            np.linspace(0.0, 2.0, 21), project_on=True, error_size=len(y0) - 1,
-            report_size=evaluator.report_size, ends=effects_of(evaluator.switches),
+        integration = INTEGRATORS[integrator].make(
+            evaluator, evaluator.integrated(u0), np.linspace(0.0, 2.0, 21),
+            **integration_options(evaluator, compiled.scene.simulation),
         )  # fmt: skip
         while integration.status is Status.RUNNING:
             integration.advance(budget)

@@ -6,7 +6,6 @@ from support.internals import rotation
 from support.process import REPOSITORY
 
 import dap3d_core as dap
-from dap3d_core.formats.import_scene.scene_of_model import STOP_TIME
 
 
 def imported(tmp_path, text, suffix, **options):
@@ -342,7 +341,8 @@ def test_a_soft_stop_is_critically_damped(tmp_path, kind, inertia):
     text = hinge("xml", "-0.5", "0.1", kind)
     scene, report = imported(tmp_path, text, "xml", rates={"q": 2.0})
     assert "critically damped" in report.translated[0].text
-    T = STOP_TIME["soft"]
+    T = 2e-3
+    assert "a time constant of 2 ms" in report.translated[0].text
     stops = [f for f in scene.forces.values() if "stop" in f.type]
     assert [f.fields["k"] for f in stops] == pytest.approx([inertia / T**2] * 2, rel=1e-14)
     at = 0.1 / 2.0

@@ -8,8 +8,6 @@ from scipy.linalg import eigvals
 from support.rotations import rotation
 
 import dap3d_core as dap
-from dap3d_core.simulation.linearization.linearization import lowest_eigenvalues
-from dap3d_core.simulation.linearization.operating_point import operating_point
 
 G = 9.81
 ROD = [1 / 12, 1 / 12, 1e-3]
@@ -186,19 +184,18 @@ def test_thousand_bodies():
     assert lin.stable
 
 
-def test_sparse_modes_are_the_dense_ones():
+def test_sparse_modes_are_the_dense_ones(monkeypatch):
     """In a chain with redundant rows and dampers both ways give the same modes."""
     scene = rods(30)
     scene.add_joint("sph", "again", P_i="end0", P_j="top1")  # three rows that repeat
     for k in range(1, 30, 3):
         scene.add_force("rot_sda", f"S{k}", v_i=f"b{k}.x", v_j=f"b{k - 1}.x", axis=f"b{k}.y",
                         k=10.0, c=2.0)  # fmt: skip
-    point = operating_point(scene, None, 0.0, False)
-    sparse = lowest_eigenvalues(point.equations, point.redundancy.rank.dependencies, 8)
-    dense = dap.Linearization(point)
-    np.testing.assert_allclose(sparse.values, dense.eigenvalues[:8], rtol=RTOL)
-    shapes = (point.equations.U @ sparse.vectors)[:, ::2]
-    of_dense = dense.modes[:, :4]
+    dense = dap.linearize(scene)
+    monkeypatch.setattr("dap3d_core.simulation.linearization.linearization.MANY_BODIES", 1)
+    sparse = dap.linearize(scene, modes=4)
+    assert sparse.eigenvalues == pytest.approx(dense.eigenvalues[:8], rel=RTOL)
+    shapes, of_dense = sparse.modes[:, :4], dense.modes[:, :4]
     largest = np.argmax(np.abs(of_dense), axis=0)
     scale = of_dense[largest, range(4)] / shapes[largest, range(4)]
     np.testing.assert_allclose(shapes * scale, of_dense, atol=1e-9)

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.internals import change_over, objects, scene_program
+from support.internals import change_over, objects
 from support.plain import jit_is_on
 from support.process import REPOSITORY
 
@@ -45,12 +45,16 @@ LONG = [path for path in MODELS if {"engineering", "A02-40"} & {path.parent.name
 def at_once(monkeypatch, model):
     """Programs are made at the first call, in this process."""
     if model not in LONG:
-        monkeypatch.setattr(scene_program, "path_of", lambda name: None)
+        monkeypatch.setattr(
+            "dap3d_core.formulations.programs.scene_program.path_of", lambda name: None
+        )
         monkeypatch.setattr(change_over, "objects", SimpleNamespace(optimised=unoptimised))
     monkeypatch.setattr(change_over, "MAKE_AFTER", 0.0)
     monkeypatch.setattr(change_over, "BESIDE", False)
     monkeypatch.setattr(change_over, "_records", {})
-    monkeypatch.setattr(scene_program, "is_optimised", lambda evaluator: True)
+    monkeypatch.setattr(
+        "dap3d_core.formulations.programs.scene_program.is_optimised", lambda evaluator: True
+    )
     return monkeypatch
 
 

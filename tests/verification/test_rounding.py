@@ -1,5 +1,6 @@
 """What double precision leaves open: runs go on at rounding, and the ledger knows its size."""
 
+import copy
 import sys
 
 import attrs
@@ -10,7 +11,6 @@ from support.process import REPOSITORY
 from support.stewart import stewart
 
 import dap3d_core as dap
-from dap3d_core.result.post.ledger import ledger_of
 
 sys.path.append(str(REPOSITORY / "benchmarks"))
 
@@ -49,8 +49,9 @@ def test_a_multiplier_that_is_off_by_a_millionth_is_found(pressed, row):
         )
     residual = np.array(pressed.arrays.acceleration_residual)
     residual[k] = np.abs(D @ moved).max()
-    arrays = attrs.evolve(pressed.arrays, acceleration_residual=residual)
-    assert ledger_of(summary, arrays, pressed.record)["acceleration"].ok is False
+    changed = copy.copy(pressed)
+    changed.arrays = attrs.evolve(pressed.arrays, acceleration_residual=residual)
+    assert changed.ledger["acceleration"].ok is False
 
 
 def _matrix(p):

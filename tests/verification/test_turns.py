@@ -5,6 +5,7 @@ reports."""
 import attrs
 import numpy as np
 import pytest
+from support.results import without_turns
 
 import dap3d_core as dap
 
@@ -46,13 +47,7 @@ def test_a_spring_between_two_reports_winds_up(tmp_path):
 
 def test_a_file_of_an_older_program_has_no_turns_and_says_so(tmp_path):
     result = dap.simulate(winding(), dt=0.02)  # less than half a turn between two
-    older = dap.Result(
-        attrs.evolve(result.summary, angle_count=0, angle_names=()),
-        attrs.evolve(result.arrays, angles=np.zeros((len(result.t), 0))),
-        result.record,
-        lambda: None,
-    )
-    older.save(tmp_path / "older.nc")
+    without_turns(result).save(tmp_path / "older.nc")
     read = dap.open(tmp_path / "older.nc")
     check(read)
     assert sum("holds no turns" in note for note in read.notes) == 1

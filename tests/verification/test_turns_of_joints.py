@@ -2,11 +2,11 @@
 A wheel with a damper turns by (w0 / k)(1 - exp(-k t)) with k = c / J, a wheel under a harmonic
 moment A sin(f t) by A (t / f - sin(f t) / f^2): turn by turn, closed forms."""
 
-import attrs
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from support.levels import quickly
+from support.results import without_turns
 
 import dap3d_core as dap
 
@@ -292,13 +292,7 @@ def test_resumed_saved_and_opened_runs_have_their_turns(method, tmp_path):
 def test_a_file_without_counts_is_opened_and_its_guess_is_named(tmp_path):
     """As an older program wrote it: right where reports are near, with a note in any case."""
     result = dap.simulate(wheel(), t_end=6.0, dt=0.01)
-    older = dap.Result(
-        attrs.evolve(result.summary, angle_count=0, angle_names=()),
-        attrs.evolve(result.arrays, angles=np.zeros((len(result.t), 0))),
-        result.record,
-        lambda: None,
-    )
-    older.save(tmp_path / "older.nc")
+    without_turns(result).save(tmp_path / "older.nc")
     read = dap.open(tmp_path / "older.nc")
     np.testing.assert_allclose(read.quantity("pin.angle").values, decaying(read.t), atol=1e-4)
     assert sum("holds no turns" in note for note in read.notes) == 1

@@ -5,15 +5,6 @@ A plugin imports only these functions; the compiler and its runtime serve the co
 
 from typing import TYPE_CHECKING, Any
 
-from dap3d_core.kernels.rotations import (
-    conjugate,
-    euler_parameters,
-    matmul,
-    quaternion_product,
-    rotation_matrix,
-    rotation_vector,
-    transpose,
-)
 from dap3d_core.kernels.scalar_math import (
     abs,
     acos,
@@ -41,18 +32,25 @@ from dap3d_core.kernels.table_lookup import item, lookup
 from dap3d_core.kernels.vectors import (
     add,
     by_body,
+    conjugate,
     cross,
     dot,
+    euler_parameters,
     eye,
     hstack,
+    matmul,
     neg,
     norm2,
     normals,
+    quaternion_product,
     rotate,
+    rotation_matrix,
+    rotation_vector,
     row,
     scale,
     skew,
     sub,
+    transpose,
 )
 
 if TYPE_CHECKING:

@@ -1,8 +1,8 @@
-"""Least solutions of dense equations whose rows may depend on each other.
+"""Dense equations: least solutions where rows may depend on each other, and a small inverse.
 
-By Householder reflections with exchanges of columns, and then from the right for those that are
-left over (Golub, Van Loan, Matrix Computations, 5.5): of all x that leave the least of A x - b the
-shortest, as by singular values. Matrices may be larger than what is used of them.
+Least solutions by Householder reflections with exchanges of columns, and then from the right for
+those that are left over (Golub, Van Loan, Matrix Computations, 5.5): of all x that leave the least
+of A x - b the shortest, as by singular values. Matrices may be larger than what is used of them.
 """
 
 # mypy: disable-error-code="no-any-return"
@@ -136,3 +136,25 @@ def solve_least(
             x[order[k]] -= s
             for c in range(rank, n):
                 x[order[c]] -= s * A[k, c]
+
+
+@compiled
+def invert(A: Floats, count: int) -> None:
+    """The inverse of a matrix, behind it in each row of A (count, 2 count), takes its place.
+
+    Not numbers where it has none.
+    """
+    n = 2 * count
+    for k in range(count):
+        best = k
+        for r in range(k + 1, count):
+            best = r if abs(A[r * n + k]) > abs(A[best * n + k]) else best
+        for q in range(k, n):
+            A[k * n + q], A[best * n + q] = A[best * n + q], A[k * n + q]
+        pivot = A[k * n + k]
+        for q in range(k, n):
+            A[k * n + q] /= pivot
+        for r in range(count):
+            w = A[r * n + k]
+            for q in range(k, n):
+                A[r * n + q] -= w * A[k * n + q] if r != k else 0.0

@@ -27,7 +27,7 @@ from dap3d_core.plot.style import (
     with_unit,
 )
 from dap3d_core.result import Quantity, Result, UnknownNameError, find
-from dap3d_core.result.model_summary import POINT
+from dap3d_core.result.arrays import POINT
 from dap3d_core.result.post.smooth_parts import cubic, smooth_parts
 
 #: A curve of fewer instants is drawn through about so many points.

@@ -23,7 +23,7 @@ from dap3d_core.plot.style import (
     style_axes,
     with_unit,
 )
-from dap3d_core.plot.sweep.style import LINE_COLORS, norm_of
+from dap3d_core.plot.sweep.panels import LINE_COLORS, norm_of
 
 if TYPE_CHECKING:
     from dap3d_core.simulation.linearization.eigenvalues import Complex

@@ -5,12 +5,12 @@ from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.file.atomic_write import check_target
 from dap3d_core.result.file.write import ResultWriter
 from dap3d_core.result.metadata import RunMetadata, RunStatistics, current_versions
-from dap3d_core.result.note import Note, information
+from dap3d_core.result.note import Note, information, warnings_of
 from dap3d_core.result.open import open_result
+from dap3d_core.result.post.force_output import Reaction
 from dap3d_core.result.post.global_error import ErrorEstimate, estimated_error
 from dap3d_core.result.post.ledger import Entry
 from dap3d_core.result.post.point_motion import Energy
-from dap3d_core.result.post.reactions import Reaction
 from dap3d_core.result.quantities.catalogue import Quantity
 from dap3d_core.result.quantities.lookup import find, names_of
 from dap3d_core.result.result import Result
@@ -37,4 +37,5 @@ __all__ = [
     "information",
     "names_of",
     "open_result",
+    "warnings_of",
 ]

@@ -10,7 +10,16 @@ import attrs
 import numpy as np
 
 from dap3d_core.model.groups import Floats, Integers
-from dap3d_core.result.arrays import COLUMNS, LARGE, U_ERROR, Arrays, column_sizes, joined
+from dap3d_core.result.arrays import (
+    COLUMNS,
+    LARGE,
+    U_ERROR,
+    Arrays,
+    ModelSummary,
+    column_sizes,
+    is_summary_of,
+    joined,
+)
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.file.checksum import check_checksums, check_signature
 from dap3d_core.result.file.library import NETCDF, OpenFile, reading, shared
@@ -30,7 +39,6 @@ from dap3d_core.result.file.validate import (
     check_subject,
 )
 from dap3d_core.result.metadata import RUNNING, RunMetadata
-from dap3d_core.result.model_summary import ModelSummary, is_summary_of
 from dap3d_core.result.result import Origin, Rebuild, Result
 
 _JSON = ("notes", "settings", "statistics", "versions", "events", "types", "actuation")

@@ -12,19 +12,24 @@ from dap3d_core.model import Model
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.rotations import read_only
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result.arrays import Arrays, arrays_of
+from dap3d_core.result.arrays import POINT, Arrays, ModelSummary, arrays_of, summary_of
 from dap3d_core.result.display import ResultDisplay
 from dap3d_core.result.errors import ResultError, UnknownNameError, unknown
 from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.metadata import RunMetadata, RunStatistics
-from dap3d_core.result.model_summary import POINT, ModelSummary, summary_of
 from dap3d_core.result.note import Note
 from dap3d_core.result.post.contact_output import ResultContacts
-from dap3d_core.result.post.force_output import ForceOutput, force_output, reactions_of
+from dap3d_core.result.post.force_output import (
+    ForceOutput,
+    Instants,
+    Reaction,
+    force_output,
+    jacobians,
+    reactions_of,
+)
 from dap3d_core.result.post.global_error import ErrorEstimate, sizes_of
 from dap3d_core.result.post.ledger import Entry, ledger_of
 from dap3d_core.result.post.point_motion import Energy, kinetic_energy
-from dap3d_core.result.post.reactions import Instants, Reaction, jacobians
 from dap3d_core.result.quantities.catalogue import MOTION, Quantity
 from dap3d_core.result.quantities.lookup import find
 from dap3d_core.scene import SceneError

@@ -10,8 +10,7 @@ import numpy as np
 from dap3d_core.interface import PluginError
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Computed, Result, ResultError, current_versions
-from dap3d_core.result.arrays import COLUMNS, Arrays
-from dap3d_core.result.model_summary import is_summary_of
+from dap3d_core.result.arrays import COLUMNS, Arrays, is_summary_of
 from dap3d_core.scene import SceneError, load, parse
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError

@@ -30,10 +30,9 @@ from dap3d_core.result import (
     check_target,
     information,
 )
-from dap3d_core.result.arrays import LARGE, Arrays, arrays_of, joined
+from dap3d_core.result.arrays import LARGE, Arrays, arrays_of, joined, summary_of
 from dap3d_core.result.contact_table import ContactTable, no_contacts
 from dap3d_core.result.file.atomic_write import check_utf8
-from dap3d_core.result.model_summary import summary_of
 from dap3d_core.result.open import arrays_in
 from dap3d_core.scene import MISSING, Mistake, SceneError, Simulation
 from dap3d_core.simulation.compiled_model import CompiledModel

@@ -9,7 +9,7 @@ import numpy as np
 
 from dap3d_core.model.groups import Floats
 from dap3d_core.result import Result, ResultError, UnknownNameError, find
-from dap3d_core.result.post.reactions import Reaction
+from dap3d_core.result.post.force_output import Reaction
 from dap3d_core.result.quantities.lookup import available_outputs
 from dap3d_core.scene.scene import Scene
 from dap3d_core.view.scene3d.elements import ORIGIN, ElementGeometry, Elements, elements_of

@@ -9,7 +9,6 @@ from support.internals import INTEGRATORS, METHODS
 
 from dap3d_core.cli import main
 from dap3d_core.cli.app import COMMANDS, SYNONYMS, dap3d
-from dap3d_core.cli.process import exit_codes
 
 
 def test_every_command_has_help_and_the_common_options():
@@ -23,9 +22,9 @@ def test_every_command_has_help_and_the_common_options():
 
 
 def test_main_takes_the_words_and_returns_the_exit_code(capsys):
-    assert main(["--version"]) == exit_codes.DONE
+    assert main(["--version"]) == 0
     assert capsys.readouterr().out.startswith("dap3d, version")
-    assert main(["nothing"]) == exit_codes.REFUSED
+    assert main(["nothing"]) == 2
     assert "there is no command 'nothing'" in capsys.readouterr().err
 
 
@@ -33,7 +32,7 @@ def test_main_takes_the_words_and_returns_the_exit_code(capsys):
 def test_a_command_by_another_name_is_suggested(word, command, capsys):
     """Where the nearest spelling is another command: linearize is no inverse."""
     assert command in {*COMMANDS, "--help"}
-    assert main([word]) == exit_codes.REFUSED
+    assert main([word]) == 2
     assert f"did you mean '{command}'?" in capsys.readouterr().err
 
 

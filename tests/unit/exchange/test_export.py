@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError
-from dap3d_core.view.scene3d.primitives import SOLIDS, solid, spring
 from dap3d_results.gltf import write_gltf
 from dap3d_results.moving_solids import MovingScene
 
@@ -199,19 +198,6 @@ def test_a_motion_beyond_single_precision_is_refused(tmp_path):
     result = dap.simulate(scene, t_end=0.1, dt=0.1)
     with pytest.raises(ResultError, match="single precision"):
         write_gltf(MovingScene.of(result, None), tmp_path / "a.glb")
-
-
-@pytest.mark.parametrize("form", [*map(solid, SOLIDS), spring(10.0)])
-def test_solids_are_closed_and_look_outwards(form):
-    """By the divergence theorem the volume within is positive; each edge has two triangles."""
-    vertices, inverse = np.unique(form.vertices.round(9), axis=0, return_inverse=True)
-    faces = inverse.reshape(-1)[form.triangles]
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() > 0.0
-    edges = {(int(i), int(j)) for f in faces for i, j in zip(f, np.roll(f, -1), strict=True)}
-    open_edges = {e for e in edges if e[::-1] not in edges}
-    assert len(open_edges) <= 16  # the two ends of a spring's wire
-    assert (len(open_edges) == 0) or form.vertices[:, 2].max() <= 0.51
 
 
 def test_matlab_finds_every_array_with_its_unit(result, tmp_path):

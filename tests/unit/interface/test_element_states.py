@@ -1,10 +1,10 @@
 """Fields that states bring, and words that no state may have."""
 
+import pytest
 from support.internals import COORDINATE, QUANTITIES, specs_of
 from support.state_types import Lag, Maxwell
 
-from dap3d_core.interface import Body, Force, body, number
-from dap3d_core.interface.element_states import _OF_RESULTS, state_lengths
+from dap3d_core.interface import Body, Force, PluginError, body, examine, number
 
 
 def test_states_bring_the_fields_of_their_initial_values_and_tolerances():
@@ -14,8 +14,8 @@ def test_states_bring_the_fields_of_their_initial_values_and_tolerances():
     assert (specs["z_atol"].kind, specs["z_atol"].default, specs["z_atol"].minimum) == (
         "number", 0.0, 0.0)  # fmt: skip
     assert (specs_of(Lag)["held_0"].kind, specs_of(Lag)["held_0"].default) == ("vec3", (0.0,) * 3)
-    assert state_lengths(Lag) == {"held": 3, "clock": 1}
-    assert state_lengths(Maxwell) == {"z": 1}
+    assert Lag.state_lengths() == {"held": 3, "clock": 1}
+    assert Maxwell.state_lengths() == {"z": 1}
 
 
 def test_a_type_may_declare_these_fields_itself():
@@ -41,4 +41,6 @@ def test_the_reserved_names_are_the_quantities_of_results():
     wanted = {*QUANTITIES["force"], *QUANTITIES["joint"]}
     coordinates = {"angle", "length", "angle_rate", "length_rate"}
     assert all(COORDINATE.fullmatch(n) for n in coordinates)
-    assert {*_OF_RESULTS} == wanted | coordinates
+    for name in wanted | coordinates:
+        with pytest.raises(PluginError, match=f"{name} would hide|{name}' in states is no name"):
+            examine(type("Own", (Lag,), {"keyword": "own", "states": (name,)}))

@@ -1,9 +1,9 @@
-"""Least solutions against singular values."""
+"""Least solutions against singular values; an inverse."""
 
 import numpy as np
 import pytest
 
-from dap3d_core.linear.least_squares import factor_least, solve_least
+from dap3d_core.linear.least_squares import factor_least, invert, solve_least
 
 PART = 1e-12
 
@@ -28,3 +28,12 @@ def test_columns_that_are_short_count_as_dependent():
     A, w, order = np.diag([1.0, 1e-3]), np.zeros((3, 2)), np.zeros(2, dtype=int)
     assert factor_least(A.copy(), 2, 2, 0.0, 1e-4, w, order) == 2
     assert factor_least(A.copy(), 2, 2, 0.0, 1e-2, w, order) == 1
+
+
+def test_the_inverse_of_a_matrix_takes_its_place():
+    rng = np.random.default_rng(1)
+    A = rng.normal(size=(5, 5))
+    A[0, 0] = 0.0  # pivots are chosen
+    table = np.hstack([A, np.eye(5)])
+    invert(table.ravel(), 5)  # a view
+    assert table[:, 5:] @ A == pytest.approx(np.eye(5), abs=1e-12)

@@ -13,7 +13,6 @@ from support.plain import in_another_process
 
 import dap3d_core as dap
 from dap3d_core.plot import FORMATS, plot, save_plot, show_plot
-from dap3d_core.plot.work_precision import Mark, save_work_precision
 from dap3d_core.result import ResultError, UnknownNameError
 
 
@@ -136,11 +135,8 @@ def test_saving_needs_no_window_and_the_module_can_be_called(tmp_path):
         lambda result, path, **force: save_plot(result, "work", path, **force),
         lambda result, path, **force: dap.animate(result, path, **force),
         lambda result, path, **force: dap.view(result).save(path, **force),
-        lambda _, path, **force: save_work_precision(
-            [Mark("lsq", "rk4", 1.0, 1.0, True)], path, **force
-        ),
     ],
-    ids=["plot", "animate", "view", "work_precision"],
+    ids=["plot", "animate", "view"],
 )
 def test_a_file_is_overwritten_only_when_forced(result, tmp_path, write):
     path = tmp_path / "a.png"

@@ -7,6 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from dap3d_core.plot.work_precision import Mark, draw_work_precision, save_work_precision
+from dap3d_core.result import ResultError
 
 METHODS, INTEGRATORS = ("standard", "penalty", "lsq"), ("dop853", "dopri5", "rk4", "radau")
 MARKS = [
@@ -68,8 +69,12 @@ def test_nothing_is_cut_off(tmp_path):
         assert (edge == 1.0).all()
 
 
-def test_what_cannot_be_drawn_is_refused(tmp_path):
+def test_what_cannot_be_drawn_or_written_is_refused(tmp_path):
     with pytest.raises(ValueError, match="no run"):
         save_work_precision([Mark("lsq", "rk4", 0.0, 1.0, True)], tmp_path / "a.png")
     with pytest.raises(ValueError, match=r"\.svg"):
         save_work_precision(MARKS, tmp_path / "a.gif")
+    (tmp_path / "a.png").write_text("precious")
+    with pytest.raises(ResultError, match="the file exists"):
+        save_work_precision(MARKS, tmp_path / "a.png")
+    assert (tmp_path / "a.png").read_text() == "precious"

@@ -10,7 +10,6 @@ import time
 from pathlib import Path
 
 import pytest
-from support.internals import discovery
 
 import dap3d_core as dap
 from dap3d_core.interface import PluginError
@@ -328,9 +327,11 @@ def test_of_two_distributions_of_one_name_the_one_that_is_imported_counts(
 
 def test_to_know_what_is_installed_costs_once(monkeypatch):
     """Not once for each of many runs: nothing is looked for where no folder has changed."""
-    monkeypatch.setattr(discovery, "SETTLED", 0)
+    monkeypatch.setattr("dap3d_core.registry.discovery.SETTLED", 0)
     before, asked = dap.load_registry(), []
-    monkeypatch.setattr(discovery, "distributions", lambda **names: asked.append(names) or [])
+    monkeypatch.setattr(
+        "dap3d_core.registry.discovery.distributions", lambda **names: asked.append(names) or []
+    )
     assert dap.load_registry().sources == before.sources
     assert asked == []
 

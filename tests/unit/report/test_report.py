@@ -15,7 +15,6 @@ from support.plain import long_in_plain_python
 import dap3d_core as dap
 from dap3d_core.integrators import INTEGRATORS
 from dap3d_core.report import MeasuredRun, Report, Setting
-from dap3d_core.report.measurement import Bench
 from dap3d_core.report.reference import final_position_error, first_parting, trajectory_error
 from dap3d_core.report.report import front, recommend
 from dap3d_core.report.settings_ladder import ADAPTIVE, MEASURED, ladder, ladder_of_steps
@@ -393,7 +392,9 @@ def test_a_scene_that_cannot_be_assembled_is_an_error():
 
 
 def test_a_scene_of_which_no_run_comes_to_its_end_is_an_error_with_reasons(monkeypatch):
-    monkeypatch.setattr(Bench, "run", lambda *_, **__: "the step size fell")
+    monkeypatch.setattr(
+        "dap3d_core.report.measurement.Bench.run", lambda *_, **__: "the step size fell"
+    )
     words = r"no run came to its end: .*standard, dop853: the step size fell"
     with pytest.raises(dap.SimulationError, match=words):
         dap.report(problems.pendulum(), quick=True, t_end=0.1)

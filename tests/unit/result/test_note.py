@@ -4,8 +4,7 @@ import copy
 import pickle
 
 import dap3d_core as dap
-from dap3d_core.result import Note, information
-from dap3d_core.result.note import warnings_of
+from dap3d_core.result import Note, information, warnings_of
 
 
 def test_a_note_is_its_line_with_parts():

@@ -8,7 +8,6 @@ import pickle
 import textwrap
 import tomllib
 import tracemalloc
-from importlib import import_module
 
 import attrs
 import netCDF4
@@ -16,6 +15,7 @@ import numpy as np
 import pytest
 import xarray
 from support import problems
+from support.ended import shorten_chunks
 from support.internals import Evaluator, scene_of
 from support.plain import long_in_plain_python
 from support.process import run
@@ -31,8 +31,6 @@ from support.results import (
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError, RunMetadata, RunStatistics, open_result
-from dap3d_core.result import arrays as arrays_module
-from dap3d_core.result.open import LazyArrays
 
 ABOUT = dict(
     status="interrupted",
@@ -40,8 +38,6 @@ ABOUT = dict(
     stats=RunStatistics(steps=3, rejected=1, rhs=40, projections=4, wall_time_s=0.25),
     known_versions={"dap3d": "0.1", "numpy": "2", "llvmlite": "0", "python": "3"},
 )
-KEEPING = import_module("dap3d_core.simulation.run_state")
-READING = import_module("dap3d_core.result.open")
 SHORT = {"t_end": 0.6, "dt": 0.01}
 
 
@@ -220,21 +216,18 @@ def test_a_file_that_lacks_something_or_is_of_a_newer_program_is_refused(tmp_pat
 @pytest.fixture
 def small_limits(monkeypatch):
     """Everything is large, and a block has few rows."""
-    monkeypatch.setattr(KEEPING, "LARGE", 200)
-    monkeypatch.setattr(READING, "LARGE", 200)
-    monkeypatch.setattr(arrays_module, "BLOCK", 300)
+    monkeypatch.setattr("dap3d_core.simulation.run_state.LARGE", 200)
+    monkeypatch.setattr("dap3d_core.result.open.LARGE", 200)
+    monkeypatch.setattr("dap3d_core.result.arrays.BLOCK", 300)
 
 
 @pytest.fixture
 def both(tmp_path, monkeypatch, small_limits):
     """The same run in memory, and in its file."""
-    module = import_module("dap3d_core.simulation.run")
-    monkeypatch.setattr(module, "CHUNK_SECONDS", 1e-9)
-    monkeypatch.setattr(module, "FIRST_CHUNK", 1)
+    shorten_chunks(monkeypatch)
     whole = dap.simulate(problems.four_bar(), **SHORT)
     large = dap.simulate(problems.four_bar(), output=tmp_path / "run.nc", **SHORT)
-    assert isinstance(whole.arrays, arrays_module.Arrays)
-    assert isinstance(large.arrays, LazyArrays)
+    assert type(whole.arrays) is not type(large.arrays)
     return whole, large
 
 
@@ -244,7 +237,7 @@ def test_a_large_result_is_the_same(both, tmp_path):
     assert same_bits(large, whole)
     assert large.ledger == whole.ledger
     again = dap.open(tmp_path / "run.nc")
-    assert isinstance(again.arrays, LazyArrays)
+    assert type(again.arrays) is type(large.arrays)
     assert same_bits(again, whole)
     assert same_bits(pickle.loads(pickle.dumps(again)), whole)
     assert again.reaction("A0")["i"].force.tobytes() == whole.reaction("A0")["i"].force.tobytes()
@@ -309,8 +302,8 @@ def test_a_large_result_is_saved_again_over_itself(both, tmp_path):
 @pytest.mark.slow
 def test_the_ledger_of_a_large_result_takes_little_memory(monkeypatch, tmp_path):
     """A hundredth of the arrays, but for the numbers of each instant that it compares."""
-    monkeypatch.setattr(READING, "LARGE", 200)
-    monkeypatch.setattr(arrays_module, "BLOCK", 2**12)
+    monkeypatch.setattr("dap3d_core.result.open.LARGE", 200)
+    monkeypatch.setattr("dap3d_core.result.arrays.BLOCK", 2**12)
     scene = problems.chain(40)
     dap.simulate(scene, t_end=1.0, dt=1e-3, rtol=1e-4, output=tmp_path / "run.nc")
     result = dap.open(tmp_path / "run.nc")

@@ -101,12 +101,12 @@ def test_the_reported_multipliers_give_that_reaction():
 
 
 def test_jacobian_of_many_rows_is_sparse(monkeypatch):
-    monkeypatch.setattr("dap3d_core.result.post.reactions.DENSE_ROWS", 2)
+    monkeypatch.setattr("dap3d_core.result.post.force_output.DENSE_ROWS", 2)
     result, _, _ = circling(nt=4)
     dense, _, _ = circling(nt=4)
-    monkeypatch.setattr("dap3d_core.result.post.reactions.DENSE_ROWS", 3)
+    monkeypatch.setattr("dap3d_core.result.post.force_output.DENSE_ROWS", 3)
     expected = dense.Jac
-    monkeypatch.setattr("dap3d_core.result.post.reactions.DENSE_ROWS", 2)
+    monkeypatch.setattr("dap3d_core.result.post.force_output.DENSE_ROWS", 2)
     assert len(result.Jac) == 4
     for found, D in zip(result.Jac, expected, strict=True):
         assert found.shape == (3, 6)

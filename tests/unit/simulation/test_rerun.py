@@ -1,17 +1,15 @@
 """Runs made again from their results: equal bit for bit, or with what differs."""
 
-from importlib import import_module
-
 import attrs
 import pytest
 from support import problems
+from support.ended import shorten_chunks
 from support.plain import long_in_plain_python
 from support.process import start
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError
 
-RUN = import_module("dap3d_core.simulation.run")
 SHORT = {"t_end": 0.6, "dt": 0.02}
 
 
@@ -47,8 +45,7 @@ def test_a_run_is_made_again_by_the_method_that_auto_chose_then(monkeypatch):
 
 
 def test_of_a_run_that_was_ended_the_part_that_is_there_is_compared(monkeypatch):
-    monkeypatch.setattr(RUN, "CHUNK_SECONDS", 1e-9)
-    monkeypatch.setattr(RUN, "FIRST_CHUNK", 1)
+    shorten_chunks(monkeypatch)
 
     def watch(standing):
         if standing.t > 0.3:

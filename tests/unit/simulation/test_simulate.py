@@ -1,7 +1,6 @@
 """A run: settings, reporting times, progress, interruption, failure, and what is left behind."""
 
 import re
-from importlib import import_module
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from dap3d_core.simulation import report_times
 
 ZERO = (0.0, 0.0, 0.0)
 #: The module; its name in its package is taken by its function.
-MODULE = import_module("dap3d_core.simulation.run")
 
 
 def mass_point(**fields):
@@ -30,8 +28,8 @@ def mass_point(**fields):
 @pytest.fixture
 def short_chunks(monkeypatch):
     """As many chunks as there are steps."""
-    monkeypatch.setattr(MODULE, "CHUNK_SECONDS", 1e-9)
-    monkeypatch.setattr(MODULE, "FIRST_CHUNK", 100)
+    monkeypatch.setattr("dap3d_core.simulation.run.CHUNK_SECONDS", 1e-9)
+    monkeypatch.setattr("dap3d_core.simulation.run.FIRST_CHUNK", 100)
 
 
 def arrays_of(result):
@@ -181,9 +179,9 @@ def test_chunks_change_no_bit(monkeypatch):
     compiled = dap.compile(dap.load("fourbar3"))
     wanted = arrays_of(dap.simulate(compiled, t_end=0.2, dt=0.005))
     for seconds, numbers in ((1e-9, 4_000_000), (10.0, 200), (1e-9, 1)):
-        monkeypatch.setattr(MODULE, "FIRST_CHUNK", 100)
-        monkeypatch.setattr(MODULE, "CHUNK_SECONDS", seconds)
-        monkeypatch.setattr(MODULE, "BUFFER_NUMBERS", numbers)
+        monkeypatch.setattr("dap3d_core.simulation.run.FIRST_CHUNK", 100)
+        monkeypatch.setattr("dap3d_core.simulation.run.CHUNK_SECONDS", seconds)
+        monkeypatch.setattr("dap3d_core.simulation.run.BUFFER_NUMBERS", numbers)
         assert arrays_of(dap.simulate(compiled, t_end=0.2, dt=0.005)) == wanted
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.view.page_data import page_data
 
 
 def test_a_contact_has_an_arrow_for_each_point_that_carries():
@@ -20,7 +19,7 @@ def test_a_contact_has_an_arrow_for_each_point_that_carries():
     assert result.contact("floor").force == pytest.approx(
         np.tile([-mu * mass * 9.81, 0.0, mass * 9.81], (3, 1)), abs=1e-6
     )
-    (arrow,) = [a for a in page_data(result, scene, [], None)["arrows"] if a["layer"] == "contacts"]
+    (arrow,) = [a for a in dap.view(result).data["arrows"] if a["layer"] == "contacts"]
     values, places = (
         np.frombuffer(base64.b64decode(arrow[name]), dtype="<f4").reshape(-1, 3)
         for name in ("values", "places")

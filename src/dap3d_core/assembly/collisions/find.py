@@ -3,19 +3,9 @@
 Pairs that may touch come from a grid of cells, and of the few larger shapes one by one.
 """
 
-import attrs
-import numpy as np
-
 from dap3d_core.assembly.collisions.boxes import CORNERS, boxes
 from dap3d_core.assembly.collisions.convex import touch_convex
-from dap3d_core.assembly.collisions.placed_shapes import (
-    POSE,
-    PlacedShapes,
-    place_shapes,
-    placed_shapes,
-    with_room,
-)
-from dap3d_core.assembly.collisions.records import GAP, NORMAL, POINT
+from dap3d_core.assembly.collisions.placed_shapes import PlacedShapes, place_shapes
 from dap3d_core.assembly.collisions.solids import (
     at_plane,
     ball_box,
@@ -25,7 +15,7 @@ from dap3d_core.assembly.collisions.solids import (
     sphere_capsule,
     sphere_cylinder,
 )
-from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.scene.contacts.collision_shapes import (
     BOX,
@@ -34,7 +24,6 @@ from dap3d_core.scene.contacts.collision_shapes import (
     ELLIPSOID,
     PLANE,
     SPHERE,
-    CollisionShapes,
 )
 
 #: Part of the shapes that fit into a cell.
@@ -186,25 +175,6 @@ def has_formula(a: int, b: int) -> bool:
     return b < CAPSULE or a < CYLINDER or (b == CAPSULE and a == BOX) or b > CYLINDER
 
 
-@attrs.frozen(eq=False)
-class Touches:
-    """Points where shapes may touch, k of them.
-
-    Attributes:
-        shapes: (k, 2) i and j.
-        key: (k,) a number of each pair and point, the same at the next step.
-        point: (k, 3) halfway between both surfaces, m, global axes.
-        normal: (k, 3) unit vectors from j to i.
-        gap: (k,) m, negative where they overlap.
-    """
-
-    shapes: Integers
-    key: Integers
-    point: Floats
-    normal: Floats
-    gap: Floats
-
-
 @compiled
 def touch(s: PlacedShapes, i: int, j: int, count: int) -> int:
     """Append points of shapes i and j nearer than the sum of what is near; the new count."""
@@ -256,29 +226,3 @@ def find_touches(s: PlacedShapes, poses: Floats, margin: Floats) -> bool:
                 count = touch(s, i, j, count)
     s.point_count = count
     return count <= s.found.shape[0]
-
-
-class ShapeFinder:
-    """The shapes of a model that collide, placed at poses."""
-
-    def __init__(self, shapes: CollisionShapes) -> None:
-        """Args: the shapes."""
-        self._placed = placed_shapes(shapes)
-
-    def find(self, r: Floats, p: Floats, margin: Floats) -> Touches:
-        """Points nearer than the margins of the bodies, (n + 1,) m, allow.
-
-        Args:
-            r, p: (n, 3), (n, 4) poses of the bodies without ground, m.
-            margin: of ground and all bodies; the sum of both counts.
-        """
-        poses = np.zeros((len(r) + 1, POSE))
-        poses[0, 3], poses[1:, :3], poses[1:, 3:] = 1.0, r, p
-        while not find_touches(self._placed, poses, margin):
-            self._placed = with_room(self._placed)
-        s, k = self._placed, self._placed.point_count
-        i, j, feature = s.which[:k].T
-        return Touches(
-            s.which[:k, :2], (i * len(s.kind) + j) * 256 + feature, s.found[:k, POINT:NORMAL],
-            s.found[:k, NORMAL:GAP], s.found[:k, GAP],
-        )  # fmt: skip

@@ -56,7 +56,7 @@ from dap3d_core.formulations.contacts.watched_rates import store_watched, take_w
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.scalar_math import is_differentiated, where
-from dap3d_core.linear.inverse import invert
+from dap3d_core.linear.least_squares import invert
 
 #: Compliance of a row as part of its squared length; how much less where passes do not converge,
 #: and the least. That of rows that do not depend on each other: no pivot is less than this part of

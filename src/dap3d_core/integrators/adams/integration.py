@@ -5,14 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.integrators.adams.formulas import (
+from dap3d_core.integrators.adams.step import (
     CONSTANT,
     ROWS,
     AdamsState,
+    advance_adams,
     allowed_adams_integers,
     make_table,
+    state_at,
 )
-from dap3d_core.integrators.adams.step import advance_adams, state_at
 from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.restore import restored
 from dap3d_core.kernels.array_types import Floats

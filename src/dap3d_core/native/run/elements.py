@@ -1,6 +1,6 @@
 """Joints and forces of an exported model: loops that its outputs call, and what these find.
 
-As result/post/reactions.py and force_output.py, by the loops that these call.
+As result/post/force_output.py, by the loops that these call.
 """
 
 from typing import Any

@@ -11,9 +11,9 @@ from operator import add
 from typing import Any
 
 import attrs
-import numpy as np
 
-from dap3d_core.assembly.motion.joint_motion import ROTATION, TRANSLATION
+from dap3d_core.assembly.motion.joint_motion import TRANSLATION
+from dap3d_core.assembly.motion.single_coordinate import single_coordinate
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS
 from dap3d_core.integrators.stepping.integration_state import Y
 from dap3d_core.interface.fields import SLOTS, specs_of
@@ -30,7 +30,6 @@ from dap3d_core.result.quantities.catalogue import ACTIONS
 from dap3d_core.result.quantities.lookup import find
 from dap3d_core.scene import Mistake, SceneError
 from dap3d_core.scene.expressions.expression import WORDS
-from dap3d_core.simulation.control.state_view import NAMES, conjugate, product
 from dap3d_core.simulation.output.check_outputs import instant_of
 
 #: Quantities of a body that an export without outputs has.
@@ -374,38 +373,15 @@ class _Quantities:
 
     def _coordinate(self, name: str, joint: int, attribute: str) -> Any:
         """The coordinate, or its rate, of a joint that has a single one; None for others."""
-        for group in self._model.motions.motions:
-            places = np.flatnonzero(group.joints == joint)
-            if not len(places) or len(group.parts) != 1 or group.parts[0].kind not in NAMES:
-                continue
-            names, rates = NAMES[group.parts[0].kind]
-            motion = group.take(places)
-            i, j = int(motion.body_i[0]), int(motion.body_j[0])
-            axis = tuple(motion.axis(0)[0].tolist())
-            if attribute in names and group.parts[0].kind == TRANSLATION:
-                return self._length(i, j, axis, tuple(motion.start.r[0].tolist()))
-            if attribute in names and group.parts[0].kind == ROTATION:
-                return self._angle(name, i, j, axis, tuple(motion.start.p[0].tolist()))
-            if attribute in rates:
-                now = tuple(_dot(row, axis) for row in self._axes(i))
-                if group.parts[0].kind == ROTATION:
-                    return _dot(now, vectors.sub(self._vector(i, W), self._vector(j, W)))
-                arm = vectors.sub(self._vector(i, R), self._vector(j, R))
-                carried = vectors.cross(self._vector(j, W), arm)
-                moved = vectors.sub(self._vector(i, V), self._vector(j, V))
-                return _dot(vectors.sub(moved, carried), now)
-        return None
-
-    def _length(self, i: int, j: int, axis: Any, start: Any) -> Any:
-        now = tuple(_dot(row, axis) for row in self._axes(i))
-        begin = tuple(_dot(row, start) for row in self._axes(j))
-        arm = vectors.sub(self._vector(i, R), self._vector(j, R))
-        return _dot(vectors.sub(arm, begin), now)
-
-    def _angle(self, name: str, i: int, j: int, axis: Any, start: Any) -> Any:
-        relative = product(conjugate(self._vector(j, P, 4)), self._vector(i, P, 4))
-        gone = product(conjugate(start), relative)
-        q = 2.0 * scalar_math.atan2(_dot(gone[1:], axis), gone[0])
+        found = single_coordinate(self._model.motions, joint, attribute)
+        if found is None:
+            return None
+        coordinate, is_rate = found
+        if is_rate:
+            return coordinate.rate(self._vector, self._axes)
+        q = coordinate.value(self._vector, self._axes)
+        if coordinate.kind == TRANSLATION:
+            return q
         names = list(self._model.angle_names)
         if joint_angle_name(name, 0) not in names:
             raise NotExportedError(name)

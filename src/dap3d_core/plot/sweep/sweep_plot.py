@@ -14,13 +14,17 @@ from matplotlib.ticker import MaxNLocator
 
 from dap3d_core.model.groups import Floats
 from dap3d_core.plot.style import LETTERS, Picture, folded, shown_text, unit_text, with_unit
-from dap3d_core.plot.sweep.panels import Band, Heat, Lines, Scatter, Strands
-from dap3d_core.plot.sweep.style import (
+from dap3d_core.plot.sweep.panels import (
     LINE_COLORS,
     STATUS_STYLE,
+    Band,
+    Heat,
+    Lines,
     Panel,
+    Scatter,
     Status,
     StatusLegend,
+    Strands,
     by_status,
     count_label,
     norm_of,

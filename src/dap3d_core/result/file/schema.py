@@ -6,11 +6,19 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
-from dap3d_core.result.arrays import AXES, COLUMNS, EULER, U_ERROR, Arrays, Column, column_sizes
+from dap3d_core.result.arrays import (
+    AXES,
+    COLUMNS,
+    EULER,
+    U_ERROR,
+    Arrays,
+    Column,
+    ModelSummary,
+    column_sizes,
+)
 from dap3d_core.result.contact_table import FIELDS, ContactTable, no_contacts
 from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.metadata import RUNNING, RunMetadata, RunStatistics, to_json
-from dap3d_core.result.model_summary import ModelSummary
 
 #: Version of this layout, raised when an older reader would misread it.
 FORMAT = 1

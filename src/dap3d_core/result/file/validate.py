@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.result.arrays import ModelSummary
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.event_record import CONTACT_KINDS, KINDS
-from dap3d_core.result.model_summary import ModelSummary
 
 #: Arrays up to so many bytes are read whatever the size of the file; larger ones only up to a ratio
 #: of their size to that of the file. dap3d does not compress; other programs may.

@@ -8,7 +8,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.result.arrays import Arrays
+from dap3d_core.result.arrays import Arrays, ModelSummary
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.file.atomic_write import (
     check_target,
@@ -22,7 +22,6 @@ from dap3d_core.result.file.checksum import write_checksums
 from dap3d_core.result.file.library import NETCDF, created, guarded, opened
 from dap3d_core.result.file.schema import allocate_rows, define, write_rows, write_times
 from dap3d_core.result.metadata import RUNNING, RunMetadata
-from dap3d_core.result.model_summary import ModelSummary
 
 
 def save(

@@ -16,8 +16,7 @@ from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.joint_angles import joint_angle_name
 from dap3d_core.model.rotations import read_only
 from dap3d_core.model.state_layout import split
-from dap3d_core.result.arrays import Arrays
-from dap3d_core.result.model_summary import ModelSummary
+from dap3d_core.result.arrays import Arrays, ModelSummary
 
 
 @attrs.frozen(eq=False)

@@ -16,9 +16,8 @@ import numpy as np
 
 from dap3d_core.model.groups import Floats
 from dap3d_core.model.state_layout import split, velocities_of
-from dap3d_core.result.arrays import Arrays
+from dap3d_core.result.arrays import Arrays, ModelSummary
 from dap3d_core.result.metadata import RunMetadata
-from dap3d_core.result.model_summary import ModelSummary
 from dap3d_core.result.post.point_motion import kinetic_energy, momentum
 
 #: How many steps' worth of error a run may gather.

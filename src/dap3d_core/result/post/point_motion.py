@@ -6,7 +6,7 @@ import numpy as np
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.rotations import to_body, to_global
 from dap3d_core.model.state_layout import split
-from dap3d_core.result.model_summary import ModelSummary
+from dap3d_core.result.arrays import ModelSummary
 
 
 def accelerations(v_dot: Floats) -> tuple[Floats, Floats]:

@@ -12,14 +12,12 @@ import numpy as np
 from dap3d_core.model.groups import Floats
 from dap3d_core.model.rotations import roll_pitch_yaw, roll_pitch_yaw_rates, to_body
 from dap3d_core.model.state_layout import split
-from dap3d_core.result.arrays import AXES, COLUMNS, EULER, Arrays
+from dap3d_core.result.arrays import AXES, COLUMNS, EULER, Arrays, ModelSummary
 from dap3d_core.result.errors import UnknownNameError
 from dap3d_core.result.metadata import RunMetadata
-from dap3d_core.result.model_summary import ModelSummary
 from dap3d_core.result.post.contact_output import ContactOutput
-from dap3d_core.result.post.force_output import ForceOutput
+from dap3d_core.result.post.force_output import ForceOutput, Reaction
 from dap3d_core.result.post.point_motion import Energy, accelerations, point_motion
-from dap3d_core.result.post.reactions import Reaction
 
 if TYPE_CHECKING:
     from dap3d_core.model import Model

@@ -11,7 +11,7 @@ from dap3d_core.model.groups import Floats
 from dap3d_core.result.arrays import AXES
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.file.atomic_write import whole_file
-from dap3d_core.result.post.reactions import DENSE_ROWS, jacobians
+from dap3d_core.result.post.force_output import DENSE_ROWS, jacobians
 from dap3d_core.result.quantities.catalogue import ACTIONS, MOTION, SYSTEM, Quantity
 from dap3d_core.result.quantities.lookup import (
     CONTACT_QUANTITIES,

@@ -11,9 +11,8 @@ from dap3d_core.interface.fields import SLOTS
 from dap3d_core.model.groups import Floats
 from dap3d_core.model.joint_angles import JOINT_ANGLES
 from dap3d_core.registry.suggestions import nearest
-from dap3d_core.result.arrays import AXES
+from dap3d_core.result.arrays import AXES, POINT, ModelSummary
 from dap3d_core.result.errors import LISTED, ResultError, UnknownNameError
-from dap3d_core.result.model_summary import POINT, ModelSummary
 from dap3d_core.result.quantities.catalogue import (
     ACTIONS,
     POINT_ARRAYS,

@@ -11,7 +11,7 @@ from dap3d_core.result.errors import ResultError
 from dap3d_core.result.file.atomic_write import cannot, whole_file
 from dap3d_core.result.file.library import NETCDF
 from dap3d_core.result.file.schema import about, attributes, write_attributes
-from dap3d_core.result.post.reactions import DENSE_ROWS, rows_at
+from dap3d_core.result.post.force_output import DENSE_ROWS, rows_at
 from dap3d_core.result.quantities.catalogue import ACTIONS
 from dap3d_core.result.quantities.lookup import CONTACT_QUANTITIES, find, joint_coordinates
 from dap3d_core.result.quantities.xarray_dataset import add_outputs, dataset_of
@@ -49,7 +49,7 @@ def why_no_reactions(result: "Result") -> str:
 
 
 def reactions_of(result: "Result") -> "xarray.Dataset":
-    """The reactions of all joints on all their bodies, ground included (post/reactions.py).
+    """The reactions of all joints on all their bodies, ground included (post/force_output.py).
 
     Returns:
         Dimensions time, reaction, axis; coordinate ``reaction`` (JOINT.SLOT), with the joint and

@@ -12,8 +12,7 @@ from dap3d_core.model.state_layout import split
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import information
 from dap3d_core.result.errors import unknown
-from dap3d_core.result.post.force_output import reactions_of
-from dap3d_core.result.post.reactions import Instants, Reaction
+from dap3d_core.result.post.force_output import Instants, Reaction, reactions_of
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.equilibrium.rest import EquilibriumSolution, find_rest

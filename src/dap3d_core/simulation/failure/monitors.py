@@ -173,8 +173,10 @@ def _parts_of_whole(
     evaluator: Evaluator, arrays: Arrays, group: Group, k: int, field: str, limit: float
 ) -> Floats:
     """(nt,) the wrench as a part of that at a large speed; 0 without load."""
-    from dap3d_core.result.post.force_output import ForceLoops  # not without friction
-    from dap3d_core.result.post.reactions import place_at
+    from dap3d_core.result.post.force_output import (
+        ForceLoops,  # not without friction
+        place_at,
+    )
 
     loops, size = ForceLoops(evaluator, group, k), np.zeros((len(arrays), 2))
     force = np.zeros_like(evaluator.system.force)

@@ -3,12 +3,7 @@
 import attrs
 import numpy as np
 
-from dap3d_core.formulations.contacts.contact_table import (
-    GAP,
-    REACH,
-    ContactTable,
-    find_grips,
-)
+from dap3d_core.formulations.contacts.contact_table import GAP, REACH, ContactTable, find_grips
 from dap3d_core.formulations.contacts.forces import against
 from dap3d_core.formulations.contacts.rows import put_rows
 from dap3d_core.formulations.evaluator import Evaluator

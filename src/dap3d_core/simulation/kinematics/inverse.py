@@ -13,8 +13,7 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result, RunMetadata, RunStatistics, information
-from dap3d_core.result.arrays import Arrays
-from dap3d_core.result.model_summary import summary_of
+from dap3d_core.result.arrays import Arrays, summary_of
 from dap3d_core.result.post.point_motion import kinetic_energy
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel

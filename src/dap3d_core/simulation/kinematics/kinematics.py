@@ -12,9 +12,8 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Computed, Result, RunMetadata, RunStatistics, information
-from dap3d_core.result.arrays import arrays_of
+from dap3d_core.result.arrays import arrays_of, summary_of
 from dap3d_core.result.file.atomic_write import check_target, check_utf8
-from dap3d_core.result.model_summary import summary_of
 from dap3d_core.result.post.point_motion import kinetic_energy
 from dap3d_core.scene import Mistake, Scene, SceneError, Simulation
 from dap3d_core.simulation.compiled_model import CompiledModel

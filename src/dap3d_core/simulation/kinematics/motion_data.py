@@ -17,9 +17,8 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.rotations import angular_velocities
 from dap3d_core.model.state_layout import join, split, velocities_of
 from dap3d_core.result import Result, RunMetadata
-from dap3d_core.result.arrays import Arrays
+from dap3d_core.result.arrays import Arrays, summary_of
 from dap3d_core.result.errors import UnknownNameError
-from dap3d_core.result.model_summary import summary_of
 from dap3d_core.result.quantities.lookup import find
 from dap3d_core.result.quantities.measured_data import MeasuredData, read_measured
 from dap3d_core.scene import MISSING, Mistake, SceneError

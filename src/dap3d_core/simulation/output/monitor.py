@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators import Integration
 from dap3d_core.model.state_layout import u_from_y
-from dap3d_core.result.model_summary import summary_of
+from dap3d_core.result.arrays import summary_of
 from dap3d_core.result.post.point_motion import kinetic_energy
 
 

@@ -12,7 +12,7 @@ from dap3d_core.interface.fields import slot_of
 from dap3d_core.interface.formats.frames import quaternion
 from dap3d_core.model.groups import Floats
 from dap3d_core.result import Result
-from dap3d_core.result.model_summary import ModelSummary
+from dap3d_core.result.arrays import ModelSummary
 from dap3d_core.scene import SceneError, load, parse
 from dap3d_core.scene.scene import Scene
 from dap3d_core.view.scene3d.colors import colors

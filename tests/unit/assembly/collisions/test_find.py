@@ -1,10 +1,13 @@
 """Points where shapes may touch, against supports of the shapes along the normals found."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from support.internals import placed_shapes as placed
 from support.internals import rotation
 
-from dap3d_core.assembly.collisions.find import ShapeFinder
+from dap3d_core.assembly.collisions.find import find_touches
 from dap3d_core.scene.contacts.collision_shapes import (
     BOX,
     CAPSULE,
@@ -22,6 +25,25 @@ ROUND = (SPHERE, CAPSULE, ELLIPSOID)
 #: Directions of the vertices of hulls, which lie on an ellipsoid.
 WAYS = np.random.default_rng(0).standard_normal((20, 3))
 WAYS /= np.linalg.norm(WAYS, axis=1)[:, None]
+
+
+class ShapeFinder:
+    """Shapes that are placed at poses: ``find`` them nearer than the margins of their bodies."""
+
+    def __init__(self, shapes):
+        self.placed = placed.placed_shapes(shapes)
+
+    def find(self, r, p, margin):
+        poses = np.zeros((len(r) + 1, placed.POSE))
+        poses[0, 3], poses[1:, :3], poses[1:, 3:] = 1.0, r, p
+        while not find_touches(self.placed, poses, margin):
+            self.placed = placed.with_room(self.placed)
+        shapes, found = (
+            x[: self.placed.point_count] for x in (self.placed.which, self.placed.found)
+        )
+        return SimpleNamespace(
+            shapes=shapes[:, :2], point=found[:, :3], normal=found[:, 3:6], gap=found[:, 6]
+        )
 
 
 def finder(kinds, sizes):

@@ -11,7 +11,6 @@ from unit.study.test_equilibrium_path import pendulum
 
 import dap3d_core as dap
 from dap3d_core.cli import main
-from dap3d_core.simulation.equilibrium import continuation
 
 pytestmark = long_in_plain_python
 follow = dap.equilibrium_path
@@ -71,7 +70,7 @@ def test_table_fits_sixty_columns(model, capsys, monkeypatch):
 @pytest.mark.slow
 def test_path_that_ends_on_its_way(tmp_path, capsys, monkeypatch):
     """What was found is printed; the exit code is that of a run that stopped early."""
-    monkeypatch.setattr(continuation, "SHORTEST_STEP", 1e-2)
+    monkeypatch.setattr("dap3d_core.simulation.equilibrium.continuation.SHORTEST_STEP", 1e-2)
     reach().save(tmp_path / "reach.toml")
     over = ["--over", "points.pin.sPp.x=0.6:1.2:4"]
     assert main(["equilibrium", str(tmp_path / "reach.toml"), *over]) == 3

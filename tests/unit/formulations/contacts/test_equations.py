@@ -5,7 +5,6 @@ import pytest
 from support.internals import ContactTable
 
 import dap3d_core as dap
-from dap3d_core.linear.inverse import invert
 from dap3d_core.simulation import CompiledModel
 
 G, MU, MASS, HEIGHT = 9.81, 0.3, 2.0, 0.05
@@ -81,12 +80,3 @@ def test_forces_of_feet_that_share_a_load_are_the_least():
     weights = np.sum(scaled**2, axis=1)
     null = np.linalg.svd(D.T)[2][3:]  # of forces that change nothing
     assert null @ (weights * forces) == pytest.approx(0.0, abs=1e-9 * MASS * G)
-
-
-def test_the_inverse_of_a_matrix_takes_its_place():
-    rng = np.random.default_rng(1)
-    A = rng.normal(size=(5, 5))
-    A[0, 0] = 0.0  # pivots are chosen
-    table = np.hstack([A, np.eye(5)])
-    invert(table.ravel(), 5)  # a view
-    assert table[:, 5:] @ A == pytest.approx(np.eye(5), abs=1e-12)

@@ -10,7 +10,6 @@ from support.plain import long_in_plain_python
 from unit.formulations.joint.test_equations import ACCELERATIONS, MULTIPLIERS, closed
 
 import dap3d_core as dap
-from dap3d_core.formulations.joint_loops import tables
 from dap3d_core.simulation import CompiledModel
 
 #: Singular values of the scaled Jacobian below this part of the largest belong to dependent rows:
@@ -243,7 +242,7 @@ def ladder(rungs):
 
 def test_rows_of_too_many_meetings_are_refused(monkeypatch):
     """Where their arrays would take gigabytes; here from a hundred numbers on."""
-    monkeypatch.setattr(tables, "MOST_NUMBERS", 100)
+    monkeypatch.setattr("dap3d_core.formulations.joint_loops.tables.MOST_NUMBERS", 100)
     with pytest.raises(
         dap.SimulationError, match=r"kept rows would take .* GB. Use method standard"
     ):

@@ -5,8 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from support import integrands as toys
 from support.integrands import finish, kepler, kepler_f, kepler_orbit, slope
-from support.internals import compiled, loop_list
-from support.internals import formulas as adams
+from support.internals import adams, compiled, loop_list
 
 from dap3d_core.integrators import Status
 from dap3d_core.integrators.adams.integration import AdamsIntegration

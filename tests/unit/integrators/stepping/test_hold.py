@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from support.internals import integration_options
 from support.pushed import pushed_block
 
 import dap3d_core as dap
 from dap3d_core.integrators import INTEGRATORS, Status
 from dap3d_core.integrators.stepping.hold import Hold
-from dap3d_core.simulation.settings import integration_options
 
 TIMES = np.array([0.0, 0.25, 0.5, 1.0])
 

@@ -121,7 +121,7 @@ NOT_NEEDED = tuple(
     for module in (
         "formulations.joint.lanes", "integrators.runge_kutta.lanes", "study.batch.lanes",
         "assembly.collisions", "integrators.moreau", "formulations.contacts",
-        "formulations.joint_loops.contacts", "linear.inverse", "linear.least_squares",
+        "formulations.joint_loops.contacts", "linear.least_squares",
     )
 )  # fmt: skip
 

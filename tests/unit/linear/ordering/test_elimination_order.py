@@ -12,7 +12,6 @@ from support.nets import fourbars, ladder, plate_net, rod_net
 from support.plain import jit_is_on
 
 import dap3d_core as dap
-from dap3d_core.linear.ldlt import plan
 from dap3d_core.linear.ordering import elimination_order, ordering
 
 EPS = np.finfo(float).eps
@@ -220,7 +219,7 @@ def test_the_program_is_found_once_for_all_runs_and_steps(monkeypatch):
         calls.append(given)
         return elimination_order.order_nodes(*given, **options)
 
-    monkeypatch.setattr(plan, "order_nodes", counted)
+    monkeypatch.setattr("dap3d_core.linear.ldlt.plan.order_nodes", counted)
     scene = dap.Scene(name="two rods")
     outer = "ground.O"
     for k in range(2):

@@ -1,7 +1,6 @@
 """What a checkpoint holds matters: runs that are ended where the next step reads it."""
 
 import itertools
-from importlib import import_module
 
 import numpy as np
 import pytest
@@ -13,8 +12,6 @@ from support.plain import jit_is_on, long_in_plain_python
 from support.results import same_run
 
 import dap3d_core as dap
-
-RUN = import_module("dap3d_core.simulation.run")
 
 
 @pytest.fixture(autouse=True)
@@ -29,7 +26,7 @@ def test_rows_that_wait_for_room_come_after_it(integrator, tmp_path, monkeypatch
     """A row fills the buffer: the others of the step are interpolated when it goes on."""
     if integrator != "dop853" and not jit_is_on():
         pytest.skip("takes long in plain Python")
-    monkeypatch.setattr(RUN, "BUFFER_NUMBERS", 1)
+    monkeypatch.setattr("dap3d_core.simulation.run.BUFFER_NUMBERS", 1)
     settings = {"t_end": 1.0, "dt": 0.002, "integrator": integrator}
     whole = dap.simulate(problems.pendulum(), **settings)
     checkpoint = leave(problems.pendulum(), tmp_path, 0.5, **settings)

@@ -6,11 +6,8 @@ from support.plain import long_in_plain_python
 from support.pushed import feedback, held, pushed_block
 
 import dap3d_core as dap
-from dap3d_core.integrators.stepping import hold
 from dap3d_core.result import ResultError
 from dap3d_core.simulation import CheckpointError
-from dap3d_core.simulation import run as run_module
-from dap3d_core.simulation.control import sampled
 
 
 def run(update, scene=None, every=0.1, t_end=1.0, **more):
@@ -198,10 +195,10 @@ def test_events_are_located_between_samples():
 @pytest.mark.parametrize("integrator", ["dop853", "adams"])
 def test_a_resumed_run_goes_on_to_the_bit(tmp_path, monkeypatch, chunk, integrator):
     """From a checkpoint between two holds, or in the middle of one (chunks of one step)."""
-    monkeypatch.setattr(sampled, "CHUNK_SECONDS", chunk)
+    monkeypatch.setattr("dap3d_core.simulation.control.sampled.CHUNK_SECONDS", chunk)
     if chunk:
-        monkeypatch.setattr(hold, "WORK_OF_A_CALL", 0)
-        monkeypatch.setattr(hold, "LEAST_WORK", 0)
+        monkeypatch.setattr("dap3d_core.integrators.stepping.hold.WORK_OF_A_CALL", 0)
+        monkeypatch.setattr("dap3d_core.integrators.stepping.hold.LEAST_WORK", 0)
     path, calls = tmp_path / "run.nc", [0]
     controllers = [dap.Controller(every=0.07, update=feedback)]
     options = {"t_end": 1.0, "dt": 0.03, "controllers": controllers, "integrator": integrator}
@@ -269,7 +266,7 @@ def test_a_controlled_run_is_not_made_again_without_its_script():
 def test_reports_within_a_step_wait_for_room(monkeypatch):
     """With a buffer of few rows: those before a sample are made with what acted there."""
     wanted = run(feedback, every=0.25, dt=0.02)
-    monkeypatch.setattr(run_module, "BUFFER_NUMBERS", 100)
+    monkeypatch.setattr("dap3d_core.simulation.run.BUFFER_NUMBERS", 100)
     found = run(feedback, every=0.25, dt=0.02)
     for name in ("t", "u", "v_dot", "inputs"):
         assert np.array_equal(getattr(wanted, name), getattr(found, name)), name

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.internals import redundancy, split
+from support.internals import split
 from support.mechanisms import bent_chain, door, planar_four_bar, rough_four_bar, torn, two_motors
 from support.own_types import registry_of
 
@@ -10,7 +10,7 @@ import dap3d_core as dap
 from dap3d_core.interface import Function, Joint, Vector2, number, vector2
 from dap3d_core.kernels import cross, dot, neg, row, scale, sqrt, where
 from dap3d_core.result import Note
-from dap3d_core.simulation.initial import assemble, least_change
+from dap3d_core.simulation.initial import assemble
 
 
 def corrected(scene, **options):
@@ -22,8 +22,8 @@ def corrected(scene, **options):
 @pytest.fixture
 def many_rows(monkeypatch):
     """Every scene is treated as one of many rows."""
-    monkeypatch.setattr(least_change, "DENSE_ROWS", 0)
-    monkeypatch.setattr(redundancy, "FEW_ROWS", 0)
+    monkeypatch.setattr("dap3d_core.simulation.initial.least_change.DENSE_ROWS", 0)
+    monkeypatch.setattr("dap3d_core.simulation.redundancy.redundancy.FEW_ROWS", 0)
 
 
 def turn_of(u, v, n):
@@ -325,8 +325,8 @@ def test_the_correction_of_many_rows_is_that_of_few(scene, monkeypatch):
     """The block factorisation finds the least change that numpy finds, redundant rows or not: both
     end within 1e-10 of the constraints, after passes that agree to rounding times the condition."""
     _, few = corrected(scene)
-    monkeypatch.setattr(least_change, "DENSE_ROWS", 0)
-    monkeypatch.setattr(redundancy, "FEW_ROWS", 0)
+    monkeypatch.setattr("dap3d_core.simulation.initial.least_change.DENSE_ROWS", 0)
+    monkeypatch.setattr("dap3d_core.simulation.redundancy.redundancy.FEW_ROWS", 0)
     evaluator, many = corrected(scene)
     metric = evaluator.system.metric.copy()
     assert many.passes == few.passes > 0

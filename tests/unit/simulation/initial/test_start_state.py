@@ -1,10 +1,9 @@
 """Runs that start from the state of a result, or at rest."""
 
-from importlib import import_module
-
 import numpy as np
 import pytest
 from support import at_rest, problems
+from support.ended import shorten_chunks
 from support.plain import long_in_plain_python
 
 import dap3d_core as dap
@@ -12,7 +11,6 @@ from dap3d_core.result import ResultError
 from dap3d_core.simulation.initial.start_state import start_state
 
 pytestmark = long_in_plain_python
-RUN = import_module("dap3d_core.simulation.run")
 SHORT = {"t_end": 0.4, "dt": 0.02, "rtol": 1e-11, "atol": 1e-13}
 
 
@@ -152,8 +150,7 @@ def test_a_run_from_a_result_says_that_it_cannot_be_repeated(swing):
 
 def test_a_run_from_a_result_goes_on_from_its_checkpoint(tmp_path, monkeypatch):
     """Bit for bit, the start interpolated and corrected."""
-    monkeypatch.setattr(RUN, "CHUNK_SECONDS", 1e-9)
-    monkeypatch.setattr(RUN, "FIRST_CHUNK", 1)
+    shorten_chunks(monkeypatch)
     scene = problems.four_bar()
     first = dap.simulate(scene, t_end=0.3, dt=0.1)
     whole = dap.simulate(scene, start=(first, 0.123), t_end=0.4, dt=0.1)

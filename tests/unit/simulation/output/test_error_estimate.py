@@ -4,7 +4,6 @@ import attrs
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.simulation.output import error_estimate
 
 MOTION = dict(t_end=0.2, dt=0.1)
 
@@ -25,7 +24,7 @@ def test_a_quick_estimate_is_that_of_a_second_run():
 
 def test_a_first_run_that_took_long_has_none(monkeypatch):
     """Nothing is begun that is sure to take longer; the note is for information."""
-    monkeypatch.setattr(error_estimate, "SLOWER", 1e9)
+    monkeypatch.setattr("dap3d_core.simulation.output.error_estimate.SLOWER", 1e9)
     result = quick()
     assert result.error is None
     assert len(reasons(result)) == 1
@@ -34,8 +33,8 @@ def test_a_first_run_that_took_long_has_none(monkeypatch):
 
 
 def test_a_second_run_that_takes_longer_is_ended(monkeypatch):
-    monkeypatch.setattr(error_estimate, "SLOWER", 0.0)
-    monkeypatch.setattr(error_estimate, "QUICK_SECONDS", 1e-9)
+    monkeypatch.setattr("dap3d_core.simulation.output.error_estimate.SLOWER", 0.0)
+    monkeypatch.setattr("dap3d_core.simulation.output.error_estimate.QUICK_SECONDS", 1e-9)
     result = quick()
     assert result.status == "done"
     assert result.error is None

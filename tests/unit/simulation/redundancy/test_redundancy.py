@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.internals import correct_initial, rank, redundancy
+from support.internals import correct_initial
 from support.mechanisms import (
     bent_chain,
     bricard,
@@ -65,11 +65,11 @@ def test_a_row_of_four_bars_has_three_redundant_rows_a_loop(way, monkeypatch):
     has two rows, 6N+2 in all, and every one counts: 6N+3 freedoms of the plane less that is 1. Out
     of the plane nothing moves: rank 3 (2N+1). So rank 12N+5 and 3N rows too many."""
     N = 8
-    monkeypatch.setattr(redundancy, "FEW_ROWS", 0)
+    monkeypatch.setattr("dap3d_core.simulation.redundancy.redundancy.FEW_ROWS", 0)
     if way != "svd of parts":
-        monkeypatch.setattr(rank, "PART_ROWS", 0)
+        monkeypatch.setattr("dap3d_core.linear.rank.rank.PART_ROWS", 0)
     if way == "inverse iteration":
-        monkeypatch.setattr(rank, "by_elimination", lambda problem, K: None)
+        monkeypatch.setattr("dap3d_core.linear.rank.rank.by_elimination", lambda problem, K: None)
     found = dap.compile(four_bar_row(N, 0.3)).redundancy()
     assert found.rank.method == way
     counts = (found.rank.rows, found.rank.rank, found.rank.redundant, found.rank.dof)
@@ -90,8 +90,8 @@ def test_trees_need_no_singular_values(n, way):
 def test_what_hangs_on_a_loop_takes_no_part(monkeypatch):
     """A pendulum on each coupler of a row of four-bars adds five independent rows and a freedom
     each; elimination still is a proof, and the pendulums' reactions are unique."""
-    monkeypatch.setattr(redundancy, "FEW_ROWS", 0)
-    monkeypatch.setattr(rank, "PART_ROWS", 0)
+    monkeypatch.setattr("dap3d_core.simulation.redundancy.redundancy.FEW_ROWS", 0)
+    monkeypatch.setattr("dap3d_core.linear.rank.rank.PART_ROWS", 0)
     scene = four_bar_row(4, 0.3)
     for k in range(1, 5):
         r = np.add(scene.bodies[f"coupler{k}"].r, (0.0, -0.5, 0.0))
@@ -139,7 +139,7 @@ def test_what_is_redundant_at_one_pose_alone(rows, monkeypatch):
     eight rows are redundant there alone, six everywhere."""
     if rows == "many":
         monkeypatch.setattr("dap3d_core.simulation.initial.least_change.DENSE_ROWS", 0)
-        monkeypatch.setattr(redundancy, "FEW_ROWS", 0)
+        monkeypatch.setattr("dap3d_core.simulation.redundancy.redundancy.FEW_ROWS", 0)
     found, elsewhere = elsewhere_of(four_bar_row(2, np.pi / 2))
     assert (found.rank.rank, found.rank.redundant, found.rank.dof) == (27, 8, 3)
     assert elsewhere.everywhere is False

@@ -9,8 +9,6 @@ from support.plain import long_in_plain_python
 import dap3d_core as dap
 from dap3d_core.model.model import ReferencePoses
 from dap3d_core.study import Ensemble, PointStatus, Study, outputs_of, with_values
-from dap3d_core.study.batch import driver
-from dap3d_core.study.batch.batch import ModelRebuilder
 from dap3d_core.study.batch.parameter_map import ParameterMap, dependence_of
 
 DONE, STOPPED, FAILED = PointStatus.DONE, PointStatus.STOPPED, PointStatus.FAILED
@@ -249,7 +247,7 @@ def test_numbers_that_are_copied_need_no_check_and_no_model(monkeypatch):
     def refuse(*args):
         raise AssertionError("a model was made")
 
-    monkeypatch.setattr(ModelRebuilder, "load", refuse)
+    monkeypatch.setattr("dap3d_core.study.batch.batch.ModelRebuilder.load", refuse)
     monkeypatch.setattr(Ensemble, "result", refuse)
     assert of.run([[1.5], [2.0]]).status.tolist() == [DONE, DONE]
 
@@ -350,9 +348,7 @@ def test_points_whose_bodies_start_elsewhere_are_left_open():
     points = np.array([[0.3], [0.3]])
     of.run(points)
     runner = of._runner()
-    mapped = runner.parameter_map
-    y0 = mapped.states(points, of.compiled.model.u0)
-    y0[1, :3] += (0.1, 0.0, 0.0)
-    table, _ = mapped.table(points)
-    rows = runner._runs.run(table, mapped.places, y0, driver.CORRECT)
+    start, _ = runner._mapped_starts(runner.parameter_map, points)
+    start.y0[1, :3] += (0.1, 0.0, 0.0)
+    rows = runner._runs.run(*start)
     assert rows.done.tolist() == [True, False]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from support import mechanisms, trees
-from support.internals import JP, METRIC_CONSTANTS, change_over, scene_program
+from support.internals import JP, METRIC_CONSTANTS, change_over
 from support.on_axles import driven, stone, wheel
 from support.plain import jit_is_on
 from support.state_types import stated
@@ -13,7 +13,6 @@ from unit.study.batch.test_batch import pendulum as ball_pendulum
 
 import dap3d_core as dap
 from dap3d_core.study import Ensemble
-from dap3d_core.study.batch import compiled_batch
 from dap3d_core.study.batch import lanes as study_lanes
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="plain Python has no vectors")
@@ -35,8 +34,10 @@ def at_once(monkeypatch):
     monkeypatch.setattr(change_over, "BESIDE", False)
     for name in ("LOAD_AFTER", "MAKE_AFTER"):
         monkeypatch.setattr(change_over, name, 0.0)
-    monkeypatch.setattr(scene_program, "is_optimised", lambda evaluator: True)
-    monkeypatch.setattr(compiled_batch, "BEFORE_LANES", 1)
+    monkeypatch.setattr(
+        "dap3d_core.formulations.programs.scene_program.is_optimised", lambda evaluator: True
+    )
+    monkeypatch.setattr("dap3d_core.study.batch.compiled_batch.BEFORE_LANES", 1)
     monkeypatch.setattr(study_lanes, "LEAST_COMPONENTS", 1)
     monkeypatch.setattr(study_lanes.LaneBatch, "is_ready", True)
     monkeypatch.setattr(study_lanes.LaneBatch, "run", counted)

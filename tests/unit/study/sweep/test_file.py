@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.internals import checksum, is_sweep
+from support.internals import is_sweep
 from support.plain import long_in_plain_python
 from unit.result.file.test_checksum import REFUSED, SIZE, changed_files, no_library, written
 from unit.study.sweep.test_sweep import spring
@@ -39,7 +39,7 @@ def test_a_byte_changed_anywhere_is_refused(good, tmp_path, no_library):
 
 def test_of_a_large_file_the_beginning_is_compared(good, tmp_path, monkeypatch):
     """And of a small one all, whatever it says."""
-    monkeypatch.setattr(checksum, "WHOLE", 1000)
+    monkeypatch.setattr("dap3d_core.result.file.checksum.WHOLE", 1000)
     monkeypatch.setattr(sweep_file, "WHOLE", 1000)
     dap.sweep(spring(), **ASKED, output=tmp_path / "a.nc")
     assert dap.open_sweep(tmp_path / "a.nc").equals(dap.open_sweep(good))

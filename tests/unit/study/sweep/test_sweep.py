@@ -7,14 +7,12 @@ import attrs
 import numpy as np
 import pytest
 import xarray
-from support.internals import free_space
 from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.cli.console import sweep_tables
 from dap3d_core.result import ResultError, current_versions
-from dap3d_core.study.sweep import file as growing
-from dap3d_core.study.sweep import sweep
+from dap3d_core.study import Ensemble
 
 #: Rest length and start of the spring below, m.
 LENGTH, START = 1.0, 1.25
@@ -52,7 +50,7 @@ def one_by_one(monkeypatch):
             ran.append(int(place))
             yield np.array([place]), ensemble.run(points[[place]])
 
-    monkeypatch.setattr(sweep, "run_here", run_here)
+    monkeypatch.setattr("dap3d_core.study.sweep.sweep.run_here", run_here)
     return ran
 
 
@@ -270,7 +268,7 @@ def test_notes_survive(tmp_path, one_by_one):
 
 
 def test_a_part_may_be_read_while_it_grows(tmp_path, one_by_one, monkeypatch):
-    monkeypatch.setattr(growing, "EVERY", 0.0)
+    monkeypatch.setattr("dap3d_core.study.sweep.file.EVERY", 0.0)
     seen = []
 
     def look(done, total):
@@ -428,8 +426,8 @@ def test_mistakes_are_reported_together(changes, keys, words):
 
 def test_a_sweep_without_room_is_refused(monkeypatch, tmp_path):
     """In memory and on the disk, with figures; force begins it all the same."""
-    monkeypatch.setattr(free_space, "_free_memory", lambda: 2**20)
-    monkeypatch.setattr(free_space, "_free_disk", lambda folder: 2**20)
+    monkeypatch.setattr("dap3d_core.simulation.output.free_space._free_memory", lambda: 2**20)
+    monkeypatch.setattr("dap3d_core.simulation.output.free_space._free_disk", lambda folder: 2**20)
     vary = {"forces.spring.k": "1:2:20001"}
     options = dict(outputs="block.r.x:series", t_end=0.1, dt=0.1 / 1000)
     with pytest.raises(dap.SceneError, match=r"20,001 points .* in memory"):
@@ -443,14 +441,13 @@ def test_a_sweep_without_room_is_refused(monkeypatch, tmp_path):
 def test_whole_numbers_stay_whole(monkeypatch):
     """Of a field that is one (of teeth, say): halves and ranges that are sampled are refused."""
     scene = spring()
-    plain = sweep.Ensemble
 
     def with_whole(study, announce=None):
-        ensemble = plain(study, announce)
+        ensemble = Ensemble(study, announce)
         ensemble.parameters = tuple(attrs.evolve(p, whole=True) for p in ensemble.parameters)
         return ensemble
 
-    monkeypatch.setattr(sweep, "Ensemble", with_whole)
+    monkeypatch.setattr("dap3d_core.study.sweep.sweep.Ensemble", with_whole)
     for spec, sample in (("1:2:3", None), ("1:4", 2)):
         with pytest.raises(dap.SceneError, match="this is a whole number; list whole values"):
             dap.sweep(scene, {"forces.spring.k": spec}, outputs="block.r.x", sample=sample, **TIMES)

@@ -16,7 +16,7 @@ from dap3d_core.model import build_model
 from dap3d_core.scene import check
 from dap3d_core.view.scene3d.colors import CYCLE, chains_of, colors
 from dap3d_core.view.scene3d.elements import elements_of, joints_of
-from dap3d_core.view.scene3d.primitives import turned_to
+from dap3d_core.view.scene3d.primitives import SOLIDS, solid, spring, turned_to
 from dap3d_core.view.scene3d.sampled_motion import Extent, Motion, instants_to_show, stage
 from dap3d_core.view.scene3d.scene_data import (
     DRAWINGS,
@@ -116,6 +116,19 @@ def test_a_bare_body_hides_nothing_and_shows_that_it_turns():
 def test_marks_turn_to_their_axes(axis):
     found = to_global(turned_to(axis), [0.0, 0.0, 1.0])
     np.testing.assert_allclose(found, np.array(axis) / np.linalg.norm(axis), atol=1e-12)
+
+
+@pytest.mark.parametrize("form", [*map(solid, SOLIDS), spring(10.0)])
+def test_solids_are_closed_and_look_outwards(form):
+    """By the divergence theorem the volume within is positive; each edge has two triangles."""
+    vertices, inverse = np.unique(form.vertices.round(9), axis=0, return_inverse=True)
+    faces = inverse.reshape(-1)[form.triangles]
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() > 0.0
+    edges = {(int(i), int(j)) for f in faces for i, j in zip(f, np.roll(f, -1), strict=True)}
+    open_edges = {e for e in edges if e[::-1] not in edges}
+    assert len(open_edges) <= 16  # the two ends of a spring's wire
+    assert (len(open_edges) == 0) or form.vertices[:, 2].max() <= 0.51
 
 
 def test_colours_are_those_of_the_scene_or_differ():
