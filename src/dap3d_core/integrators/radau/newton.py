@@ -14,6 +14,7 @@ from dap3d_core.assembly.arrays import Floats, System, velocity_offset
 from dap3d_core.assembly.evaluate import largest, place, zero
 from dap3d_core.assembly.state_update import add_displacement, add_velocity
 from dap3d_core.formulations.common.constraints import linearise
+from dap3d_core.formulations.common.friction import has_friction
 from dap3d_core.formulations.stabilized_index2.jacobian import BENT, Tangent, differentiate
 from dap3d_core.formulations.stabilized_index2.stage_equations import (
     StageMatrix,
@@ -150,14 +151,17 @@ def lagrange(c: Floats, stages: int, j: int, u: float) -> float:
 
 
 @compiled
-def predict(h: float, work: RadauState, prolong: bool) -> None:
+def predict(h: float, work: RadauState, prolong: bool, system: System) -> None:
     """Starting values of the stages: the polynomials of the last step, prolonged (HW IV.8).
 
     Or the state as it is, where they are not to be prolonged, or there was no step before.
 
     mu is no smooth function: it has the same values at the stages of each step, but for a power of
-    h; where the number of stages has changed it starts from zero.
+    h; where the number of stages has changed it starts from zero. Nor is lambda prolonged where
+    rows may share it and friction depends on it: what the rows do not tell apart no iteration
+    corrects, and from step to step its rounding would grow.
     """
+    keeps = work.regularisation != 0.0 and has_friction(system)
     stages, old, now = work.Z, work.Z_old, work.multipliers
     before, last = work.last_stages, work.last_multipliers
     c, c_old = work.method.c[method_index(work.stages)], work.method.c[method_index(before)]
@@ -165,9 +169,10 @@ def predict(h: float, work: RadauState, prolong: bool) -> None:
         zero(stages[i])
         for r in range(2):
             zero(now[i, r])
-        if work.has_last_step == 0 or not prolong:
+        if work.has_last_step == 0 or not prolong or keeps:
             for k in range(now.shape[2]):
                 now[i, 1, k] = last[before - 1, 1, k]
+        if work.has_last_step == 0 or not prolong:
             continue
         ratio = h / work.accepted_step
         u = 1.0 + c[i] * ratio
@@ -176,7 +181,7 @@ def predict(h: float, work: RadauState, prolong: bool) -> None:
             now[i, 0, k] = of_mu * last[i, 0, k]
         for j in range(before):
             v = lagrange(c_old, before, j, u)
-            for k in range(now.shape[2]):
+            for k in range(0 if keeps else now.shape[2]):
                 now[i, 1, k] += v * last[j, 1, k]
             w = v * u / c_old[j]
             if j == before - 1:
