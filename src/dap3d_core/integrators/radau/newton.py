@@ -14,7 +14,6 @@ from dap3d_core.assembly.arrays import Floats, System, velocity_offset
 from dap3d_core.assembly.evaluate import largest, place, zero
 from dap3d_core.assembly.state_update import add_displacement, add_velocity
 from dap3d_core.formulations.common.constraints import linearise
-from dap3d_core.formulations.common.friction import has_friction
 from dap3d_core.formulations.stabilized_index2.jacobian import BENT, Tangent, differentiate
 from dap3d_core.formulations.stabilized_index2.stage_equations import (
     StageMatrix,
@@ -158,10 +157,10 @@ def predict(h: float, work: RadauState, prolong: bool, system: System) -> None:
 
     mu is no smooth function: it has the same values at the stages of each step, but for a power of
     h; where the number of stages has changed it starts from zero. Nor is lambda prolonged where
-    rows may share it and friction depends on it: what the rows do not tell apart no iteration
-    corrects, and from step to step its rounding would grow.
+    there are contacts, which may share it while their friction depends on it: what rows do not tell
+    apart no iteration corrects, and from step to step its rounding would grow.
     """
-    keeps = work.regularisation != 0.0 and has_friction(system)
+    keeps = system.contacts.shape[0] > 0
     stages, old, now = work.Z, work.Z_old, work.multipliers
     before, last = work.last_stages, work.last_multipliers
     c, c_old = work.method.c[method_index(work.stages)], work.method.c[method_index(before)]
