@@ -317,9 +317,11 @@ class ContactJumps(Jumps):
             raise SimulationError(f"{start}{words_of_drive(names[s.culprit], mu)}")
         jammed = " with ".join(names[c] for c in np.flatnonzero(s.jams))
         if failure == WEDGED:
+            is_newton = np.any(s.newton[s.jams != 0])
+            remedy = 'Under law = "poisson" it stops' if is_newton else "Smaller mu may help"
             raise SimulationError(
                 f"{start}{jammed} jams: no impulse within the cone of its friction gives it the "
-                'velocity that the law of impact asks for. Under law = "poisson" it stops'
+                f"velocity that its law of impact asks for. {remedy}"
             )
         raise SimulationError(
             f"{start}{jammed} jams: its friction presses the bodies together by more than it lets "
