@@ -43,6 +43,7 @@ def test_more_inputs(name):
 
 @pytest.mark.every(11)
 @pytest.mark.parametrize("number", [1_000_014, 1357, 1477, 1_642_375, 2184, 1_000_076,
+                                    6_569_051, 9_141_203, 5_192_180, 16_279_023,
                                     1_048_577, 1_159_636, 2021,
                                     1_650_876, 14_923_612, 10_445_297, 11_594_543, 18_897_519,
                                     8_897_954, 13_400_462, 21_657_220, 25_366_246, 8_355_428,
@@ -50,15 +51,20 @@ def test_more_inputs(name):
 def test_contacts_that_once_ended_falsely(number):
     """As "ever faster", by steps as short as rounding, with a force that pulls, or overlapping.
 
-    Or by bounces without an end on what stands, or a tangent that stayed no number.
+    Or by bounces without an end on what stands, or a tangent that stayed no number, or lacked a
+    part; or with rounding that grew, or an overlap that no switch saw.
     """
     assert check_contacts(str(number).encode()) == "done"
 
 
 @pytest.mark.every(4)
-@pytest.mark.parametrize("number", [1_925_281, 1_000_006, 1_066_419, 1_635_495])
+@pytest.mark.parametrize("number", [1_925_281, 1_000_006, 1_066_419, 1_635_495, 18_895_309,
+                                    17_600_526])  # fmt: skip
 def test_contacts_that_jam_are_named(number):
-    """Again and again behind impulses that set them free, or with no forces where they begin."""
+    """Again and again behind impulses that set them free, or with no forces where they begin.
+
+    Or with no impulse that Newton's law of impact asks for.
+    """
     assert check_contacts(str(number).encode()) == "jams"
 
 

@@ -61,6 +61,7 @@ class Cone(Arrays):
     A: Floats  # (3 m, 3 m), (3 m,) of u = A x + b
     b: Floats
     x: Floats  # where to begin, and the solution
+    noise: Floats  # (3 m,) what of b is rounding: less of a residual is none
     mu: Floats  # (m,) coefficients of friction
     more: Floats  # (m,) normal impulses of an earlier phase, which widen the discs
     gapless: Floats  # (m,) 1 of friction in three directions, else 0
@@ -85,7 +86,7 @@ class Cone(Arrays):
 def cone_of(m: int) -> Cone:
     """Room for problems of m contacts."""
     n = 3 * m
-    vectors = ("b", "x", "q", "moved", "F", "step", "trial", "y", "z", "new")
+    vectors = ("b", "x", "noise", "q", "moved", "F", "step", "trial", "y", "z", "new")
     return Cone(
         integer=np.zeros(1, dtype=np.int64),
         **{name: np.zeros((n, n)) for name in ("A", "K", "firm", "S")},
@@ -108,7 +109,7 @@ def solve_cone(c: Cone, tries: int) -> float:
     n = 3 * c.count
     if n == 0:
         return 0.0
-    scale = stretch(c)
+    scale = max(stretch(c), largest_noise(c) / SOLVED)
     z, left, sweeps = c.z[:n], 0.0, FIRST
     for k in range(tries):
         sweep(c, c.K, c.q, z, sweeps)
@@ -140,6 +141,15 @@ def stretch(c: Cone) -> float:
         c.r[k] = 1.0 / max(c.K[3 * k, 3 * k], c.K[3 * k + 1, 3 * k + 1],
                            c.K[3 * k + 2, 3 * k + 2], TINY)  # fmt: skip
     return scale + TINY
+
+
+@compiled
+def largest_noise(c: Cone) -> float:
+    """The residual that is rounding of the rates of a problem that is stretched."""
+    found = 0.0
+    for k in range(3 * c.count):
+        found = max(found, c.noise[k] * c.r[k // 3])
+    return found
 
 
 @compiled

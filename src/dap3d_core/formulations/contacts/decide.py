@@ -55,9 +55,12 @@ STOPPED = 1e-6
 DEAD = 1e-12
 #: Part of the longest column below which slips that are stopped depend on each other.
 DEPENDENT = 1e-12
+#: What overlaps by up to so many times the gap of what touches parts: a disk that lay flat and
+#: tilts has its lowest point below the eight on which it lay.
+DEEPER = 100.0
 #: What was decided, or why nothing is: joints prescribe that a contact closes, friction jams,
-#: bodies overlap at the start, friction would drive.
-DECIDED, PRESCRIBED, JAMMED, OVERLAPS, DRIVES = 0, 1, 2, 3, 4
+#: bodies overlap at the start, friction would drive, an impact has no impulses.
+DECIDED, PRESCRIBED, JAMMED, OVERLAPS, DRIVES, WEDGED = 0, 1, 2, 3, 4, 5
 #: Places of a mode, the direction of sliding and the share among the states of elements.
 MODE, WAY, NEAR = 0, 1, 4
 
@@ -92,7 +95,9 @@ def decide(
     if not leave_movable(t, s, system, loops, functions):
         return PRESCRIBED
     put_opening(s)
-    collide(s, system)
+    if not collide(s, system):
+        blame(s)
+        return WEDGED
     move_on(t, s, system, loops)
     find_grips(t, s, system, tensions)
     if s.jammed >= 0:
@@ -349,7 +354,8 @@ def settle(s: ContactArrays, system: System) -> None:
     put_roles(s)
     for c in range(s.state.shape[0]):
         gap, rounding = s.says.found[c, GAP], POSITION_ROUNDING * s.length[c]
-        s.values[c] = s.arm[c] * gap if abs(gap) < s.limit[c] else 0.0
+        is_near = -DEEPER * s.limit[c] < gap < s.limit[c]
+        s.values[c] = s.arm[c] * gap if is_near else 0.0
         s.least[c] = -2.0 * rounding
         is_slow = s.closing[c] < AT_REST * s.length[c] or s.opening[c] != 0
         if s.role[c] == 2 and is_slow and s.values[c] < -0.5 * rounding:

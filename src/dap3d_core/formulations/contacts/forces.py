@@ -131,7 +131,7 @@ def solve_forces(
     n, cone = 3 * s.closed_count, s.cone
     cone.count = s.closed_count
     for k in range(n):
-        cone.b[k] = s.free[3 * s.closed[k // 3] + k % 3]
+        cone.b[k], cone.noise[k] = s.free[3 * s.closed[k // 3] + k % 3], 0.0
     for k in range(s.closed_count):
         c = s.closed[k]
         for i in range(n if s.slides[c] != 0 else 0):

@@ -23,17 +23,20 @@ from dap3d_core.linear.least_squares import factor_least, solve_least
 DEPENDENT = 1e-12
 #: Normal speed, m/s of a scene of ordinary size, below which what touches does not approach.
 AT_REST = 1e-9
+#: Part of the terms of a slip that may be rounding of it.
+CANCELLED = 1e-15
 #: Rounds of one instant; in the last one all that touches stops.
 ROUNDS = 500
 #: Height of a bounce, as a part of the length of the scene, from which on what bounces is held:
-#: those that follow end after the geometric series of their times, too near to tell from rest.
-LAST_HEIGHT = 1e-13
+#: those that follow end after the geometric series of their times, too near to tell from rest. The
+#: nearer e is to 1 the more bounces that takes: LAST_LOSS over 1 - e, up to a height that touches.
+LAST_HEIGHT, LAST_LOSS, TOUCHING = 1e-13, 1e-14, 1e-10
 
 
 @compiled
 def begin_problem(s: ContactArrays) -> None:
     """The cone problem of the contacts that touch: from their slip on, with impulses zero."""
-    cone = s.cone
+    cone, own = s.cone, s.lam_free.shape[0]
     for k in range(s.touching_count):
         s.closed[k] = s.touching[k]
     s.closed_count = cone.count = s.touching_count
@@ -44,18 +47,26 @@ def begin_problem(s: ContactArrays) -> None:
         cone.gapless[k], cone.ratio[k] = s.gapless[c], s.ratio[c]
         for i in range(3):
             cone.b[3 * k + i], cone.x[3 * k + i] = s.slip[c, i], 0.0
+            row, terms = s.J[own + 3 * c + i], 0.0
+            for q in range(row.shape[0]):
+                terms += abs(row[q] * s.v[q])
+            cone.noise[3 * k + i] = CANCELLED * terms
 
 
 @compiled
-def put_impulses(s: ContactArrays, e: Floats) -> None:
-    """Impulses x (3 k,) of the contacts that touch, in both phases; e: (m,) of restitution."""
+def put_impulses(s: ContactArrays, e: Floats) -> bool:
+    """Impulses x (3 k,) of the contacts that touch, in both phases; False if there are none.
+
+    Newton's law may ask for a rebound that joints and friction, as in a wedge, hold.
+    e: (m,) of restitution.
+    """
     begin_problem(s)
     cone, n, widens = s.cone, 3 * s.closed_count, False
     for k in range(s.closed_count):
         c = s.closed[k]
         if s.newton[c] != 0:
             cone.b[3 * k] += e[c] * min(s.slip[c, 0], 0.0)
-    solve_cone(cone, TRIES)
+    left = solve_cone(cone, TRIES)
     for k in range(n):
         s.x[k] = cone.x[k]
     for k in range(s.closed_count):
@@ -65,14 +76,15 @@ def put_impulses(s: ContactArrays, e: Floats) -> None:
             s.x[3 * k] += cone.more[k]
             widens |= cone.more[k] != 0.0
     if not widens:
-        return
+        return left <= UNSOLVED
     for i in range(n):
         cone.x[i], cone.b[i] = 0.0, s.slip[s.closed[i // 3], i % 3]
         for k in range(n):
             cone.b[i] += cone.A[i, k] * s.x[k]
-    solve_cone(cone, TRIES)
+    left = max(left, solve_cone(cone, TRIES))
     for k in range(n):
         s.x[k] += cone.x[k]
+    return left <= UNSOLVED
 
 
 @compiled
@@ -96,8 +108,11 @@ def stop_slip(s: ContactArrays) -> bool:
 
 
 @compiled
-def collide(s: ContactArrays, system: System) -> None:
-    """Let the contacts in touch collide until none approaches; velocities follow."""
+def collide(s: ContactArrays, system: System) -> bool:
+    """Let the contacts in touch collide until none approaches; velocities follow.
+
+    False where there are no impulses for those that are among ``jams``.
+    """
     s.round_count, s.exchanged = 0, 0.0
     for c in range(s.state.shape[0]):
         s.work[c], s.rests_soon[c], s.is_low[c], s.role[c] = 0.0, 0, 0, 0
@@ -106,11 +121,26 @@ def collide(s: ContactArrays, system: System) -> None:
     for k in range(ROUNDS):
         if not take_part(s, k == ROUNDS - 1):
             break
-        put_impulses(s, s.e_now)
+        if not put_impulses(s, s.e_now):
+            put_wedged(s)
+            return False
         remember_round(s)
         act(s, system)
     for k in range(s.in_touch_count):
         s.role[s.in_touch[k]] = 2
+    return True
+
+
+@compiled
+def put_wedged(s: ContactArrays) -> None:
+    """Put what has no impulses among ``jams``: of what takes part those of Newton's law, if any."""
+    newton = 0
+    for c in range(s.jams.shape[0]):
+        s.jams[c] = 0
+    for k in range(s.touching_count):
+        newton = max(newton, s.newton[s.touching[k]])
+    for k in range(s.touching_count):
+        s.jams[s.touching[k]] = s.newton[s.touching[k]] == newton
 
 
 @compiled
@@ -190,6 +220,12 @@ def unjam(s: ContactArrays, system: System) -> bool:
 
 
 @compiled
+def last_height(e: float) -> float:
+    """Height of a bounce from which on it is held, as a part of the length of the scene."""
+    return min(max(LAST_HEIGHT, LAST_LOSS / max(1.0 - e, LAST_HEIGHT)), TOUCHING)
+
+
+@compiled
 def find_low(s: ContactArrays) -> bool:
     """Give role 1 to open contacts that come back from too low, of role 2; False if none does.
 
@@ -205,7 +241,7 @@ def find_low(s: ContactArrays) -> bool:
         a = -s.free[3 * c]
         for q in range(n):
             a -= s.W[3 * c, q] * s.force[q // 3, q % 3]
-        if v * v < 2.0 * LAST_HEIGHT * s.length[c] * a:
+        if v * v < 2.0 * last_height(s.e[c]) * s.length[c] * a:
             s.is_low[c], s.role[c], found = 1, 1, True
             if s.impulses[c, 0] > 0.0 and 0.0 < s.e[c] < 1.0:
                 # the speeds after bounces are v, e v, e^2 v, ...: that takes the sum of a series

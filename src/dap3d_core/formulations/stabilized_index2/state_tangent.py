@@ -156,7 +156,9 @@ def coupled_bodies(tangent: Tangent) -> list[tuple[int, int]]:
 
 
 def _joints_read(group: Group) -> list[Integers]:
-    """The joints whose multipliers the instances of a group read, (m,) each."""
+    """The joints, or contacts, whose multipliers the instances of a group read, (m,) each."""
+    if group.type_info.type.is_contact:
+        return [group.members] if group.loaded is None else [group.members, group.loaded]
     return [read.members for read in group.read] if group.joints is None else [group.joints]
 
 

@@ -150,14 +150,17 @@ def lagrange(c: Floats, stages: int, j: int, u: float) -> float:
 
 
 @compiled
-def predict(h: float, work: RadauState, prolong: bool) -> None:
+def predict(h: float, work: RadauState, prolong: bool, system: System) -> None:
     """Starting values of the stages: the polynomials of the last step, prolonged (HW IV.8).
 
     Or the state as it is, where they are not to be prolonged, or there was no step before.
 
     mu is no smooth function: it has the same values at the stages of each step, but for a power of
-    h; where the number of stages has changed it starts from zero.
+    h; where the number of stages has changed it starts from zero. Nor is lambda prolonged where
+    there are contacts, which may share it while their friction depends on it: what rows do not tell
+    apart no iteration corrects, and from step to step its rounding would grow.
     """
+    keeps = system.contacts.shape[0] > 0
     stages, old, now = work.Z, work.Z_old, work.multipliers
     before, last = work.last_stages, work.last_multipliers
     c, c_old = work.method.c[method_index(work.stages)], work.method.c[method_index(before)]
@@ -165,9 +168,10 @@ def predict(h: float, work: RadauState, prolong: bool) -> None:
         zero(stages[i])
         for r in range(2):
             zero(now[i, r])
-        if work.has_last_step == 0 or not prolong:
+        if work.has_last_step == 0 or not prolong or keeps:
             for k in range(now.shape[2]):
                 now[i, 1, k] = last[before - 1, 1, k]
+        if work.has_last_step == 0 or not prolong:
             continue
         ratio = h / work.accepted_step
         u = 1.0 + c[i] * ratio
@@ -176,7 +180,7 @@ def predict(h: float, work: RadauState, prolong: bool) -> None:
             now[i, 0, k] = of_mu * last[i, 0, k]
         for j in range(before):
             v = lagrange(c_old, before, j, u)
-            for k in range(now.shape[2]):
+            for k in range(0 if keeps else now.shape[2]):
                 now[i, 1, k] += v * last[j, 1, k]
             w = v * u / c_old[j]
             if j == before - 1:

@@ -210,13 +210,13 @@ def search(
     matrix: StageMatrix,
 ) -> float:
     """Predict and find the stages of a step h, by up to three attempts; as find_stages."""
-    predict(h, work, True)
+    predict(h, work, True, system)
     shorter = iterate(t, h, work, parts, tangents, system, loops, tangent, matrix)
     if shorter > 0.0 and work.convergence_rate < HOPELESS:  # once more, with the tangent at the end
         work.tangent_needed = 1
         shorter = iterate(t, h, work, parts, tangents, system, loops, tangent, matrix)
     if shorter > 0.0 and tangent.bends[0] == BENT:  # the prediction may lie beyond the bend
-        predict(h, work, False)
+        predict(h, work, False, system)
         work.tangent_needed = 1
         shorter = iterate(t, h, work, parts, tangents, system, loops, tangent, matrix)
     if shorter != 0.0 and work.tangent_is_current != 0:

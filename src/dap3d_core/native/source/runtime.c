@@ -434,7 +434,7 @@ static int let_jump(dap3d_model *m, const double *crossing, const double *sides,
 #endif
 
 #if CONTACTS
-enum { PRESCRIBED = 1, JAMMED, OVERLAPS, PUSHES, ENDLESS, SLOWLY };
+enum { PRESCRIBED = 1, JAMMED, OVERLAPS, PUSHES, WEDGED, ENDLESS, SLOWLY };
 
 /* Let switches of contacts be on the side of what goes on. */
 static void go_on(dap3d_model *m, double *sides)
@@ -507,7 +507,8 @@ static void say_failure(dap3d_model *m, double t)
     static const char *const words[] = {
         "", " closes, and joints or drivers prescribe the motion of its bodies",
         " jams: its friction presses the bodies together by more than it lets them give way",
-        ": its bodies overlap at the start", " would drive: its friction is negative", "s change ever faster",
+        ": its bodies overlap at the start", " would drive: its friction is negative",
+        " jams: an impact has no impulse within the cone of its friction. Try law = poisson", "s change ever faster",
         "s slip and turn by next to nothing, or rattle: slip jams again and again. Try smaller mu"};
     int has_name = m->failure < ENDLESS;
     const char *name = has_name ? contact_names[m->w[CONTACT_INTEGER + CI_culprit]] : "";

@@ -19,10 +19,11 @@ from dap3d_core.formulations.contacts.decide import (
     DRIVES,
     OVERLAPS,
     PRESCRIBED,
+    WEDGED,
     decide,
     repeat,
 )
-from dap3d_core.formulations.contacts.impacts import ROUNDS
+from dap3d_core.formulations.contacts.impacts import ROUNDS, TOUCHING
 from dap3d_core.formulations.contacts.modes import nearly_jams
 from dap3d_core.formulations.contacts.rows import follow_joints, keep_velocities, meet, put_rows
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
@@ -38,8 +39,8 @@ from dap3d_core.scene.errors import MISSING
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.events.jumps import LOSSLESS, MOST_RECORDS, Jumps, rows_to
 
-#: Gaps, m of a scene of ordinary size, below which bodies touch: in a run, and where it begins.
-TOUCHING, TOUCHING_AT_START = 1e-10, 1e-8
+#: Gap, m of a scene of ordinary size, below which bodies touch where a run begins.
+TOUCHING_AT_START = 1e-8
 #: Ends of modes within this part of the run: what changes more often comes to no end.
 MOST_CHANGES, WITHIN = 2000, 1e-4
 #: Jams that impulses ended, after which as many changes within this part come to none either.
@@ -315,6 +316,13 @@ class ContactJumps(Jumps):
             mu = min(s.mu[s.culprit], s.mu_s[s.culprit]) * s.arm[s.culprit]
             raise SimulationError(f"{start}{words_of_drive(names[s.culprit], mu)}")
         jammed = " with ".join(names[c] for c in np.flatnonzero(s.jams))
+        if failure == WEDGED:
+            is_newton = np.any(s.newton[s.jams != 0])
+            remedy = 'Under law = "poisson" it stops' if is_newton else "Smaller mu may help"
+            raise SimulationError(
+                f"{start}{jammed} jams: no impulse within the cone of its friction gives it the "
+                f"velocity that its law of impact asks for. {remedy}"
+            )
         raise SimulationError(
             f"{start}{jammed} jams: its friction presses the bodies together by more than it lets "
             "them give way, and no motion with Coulomb's law goes on from here"

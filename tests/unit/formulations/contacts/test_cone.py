@@ -47,6 +47,21 @@ def test_a_block_slides_by_what_friction_leaves():
     assert x == pytest.approx([weight, -pull, 0.0], rel=1e-14)
 
 
+def test_rounding_of_the_rates_is_no_residual():
+    """Of a box that comes down on four corners at 1e-5 m/s, while it slides at 1 m/s."""
+    corners = [[x, y, -0.05] for x in (-0.2, 0.2) for y in (-0.15, 0.15)]
+    axes = np.eye(3)[[2, 0, 1]]
+    J = np.array([[*e, *np.cross(r, e)] for r in corners for e in axes])
+    weights = np.array([1.0, 1.0, 1.0, 100.0, 60.0, 50.0])
+    b = J @ [0.0, 0.0, -1e-5, 1e-5, 2e-5, 0.0] + 1e-15 * np.cos(np.arange(12.0))
+    problem = cone.cone_of(4)
+    problem.count, problem.A[:], problem.b[:], problem.mu[:] = 4, J * weights @ J.T, b, 1.0
+    assert cone.solve_cone(problem, cone.TRIES) > cone.SOLVED
+    problem.x[:], problem.noise[:] = 0.0, 2e-15
+    assert cone.solve_cone(problem, cone.TRIES) <= cone.SOLVED
+    assert np.abs(problem.A @ problem.x + b).max() < 1e-14
+
+
 def test_contacts_that_jam_each_other_have_no_solution():
     """Neither both forces (-161, -67), nor one alone (the other would accelerate by -52, -15)."""
     A = np.kron([[0.06037, -0.29260], [-0.26205, 0.48465]], np.diag([1.0, 0.0, 0.0]))

@@ -35,6 +35,24 @@ def test_the_derivatives_of_a_maxwell_element():
     assert np.linalg.norm(force) == pytest.approx(K / np.sqrt(MASS), rel=1e-6)
 
 
+def on_one_leg():
+    """A body that slides on the end of a leg ahead of it: friction changes its own normal force."""
+    scene = dap.Scene(name="on one leg")
+    scene.add_body("b", mass=1.0, Jp=[0.02, 0.025, 0.03], r=[0, 0, 0.15], r_dot=[-0.5, 0.2, 0])
+    scene.add_point("foot", "b", [-0.2, 0.05, -0.15])
+    scene.add_force("weight", "g")
+    scene.add_contact("ball_plane", "floor", P_i="foot", mu=0.8)
+    scene.simulation.contact = "events"
+    return scene
+
+
+def test_newton_converges_where_friction_lifts_or_presses():
+    """The tangent has sliding friction by the normal force: 13 steps, without that 153."""
+    result = dap.simulate(on_one_leg(), t_end=0.1, dt=0.05, integrator="radau", rtol=1e-10)
+    assert result.contact("floor").mode[-1] == 1
+    assert result.stats.steps < 30
+
+
 @pytest.mark.parametrize("make", [pulled, steered])
 def test_newton_converges_at_the_rate_of_an_exact_tangent(make):
     """Some two iterations a step: without a part of the tangent it would be ten and more."""

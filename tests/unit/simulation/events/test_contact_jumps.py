@@ -173,6 +173,40 @@ def test_newtons_law_reverses_the_normal_velocity():
     assert impact.u_after[9] == pytest.approx(-0.5 * impact.u[9], rel=1e-12)
 
 
+def wedged(law):
+    """A rod on a pin, whose tip strikes the floor so steeply that friction holds it there."""
+    scene, angle = dap.Scene(name="wedged"), 0.7
+    along = np.array([np.sin(angle), 0.0, -np.cos(angle)])
+    pin = [0.0, 0.0, 0.5 * np.cos(0.6)]
+    turn = 0.5 * np.pi - angle
+    scene.add_body("rod", mass=1.0, Jp=[0.001, 0.02, 0.02], r=pin + 0.25 * along,
+                   p=[np.cos(0.5 * turn), 0.0, np.sin(0.5 * turn), 0.0],
+                   r_dot=0.5 * np.array([along[2], 0.0, -along[0]]), w=[0.0, 2.0, 0.0])  # fmt: skip
+    scene.add_point("eye", "rod", [-0.25, 0.0, 0.0])
+    scene.add_point("tip", "rod", [0.25, 0.0, 0.0])
+    scene.add_point("pin", "ground", pin)
+    scene.add_joint("rev", "hinge", P_i="eye", P_j="pin", a_i="rod.y", a_j="ground.y")
+    scene.add_force("weight", "g")
+    scene.add_contact("ball_plane", "floor", P_i="tip", mu=1.0, e=0.5, law=law)
+    return scene
+
+
+def test_a_wedge_stops_by_poissons_law_and_jams_by_newtons():
+    result = dap.simulate(wedged("poisson"), t_end=0.3, dt=0.1)
+    assert np.abs(result.w[-1]).max() < 1e-9
+    assert [event.kind for event in result.events] == ["impact", "touch"]
+    with pytest.raises(dap.SimulationError, match=r"floor jams: no impulse.*poisson"):
+        dap.simulate(wedged("newton"), t_end=0.3, dt=0.1)
+
+
+def test_bounces_without_loss_end_where_they_are_too_low_to_tell():
+    scene = touching(bouncing(e=1.0, mu=0.0))
+    scene.bodies["ball"].r_dot = [1.0, 0.0, 3e-5]  # 5e-11 m high, 6 us long
+    result = dap.simulate(scene)
+    assert result.contact("floor").mode[-1] == 1
+    assert len(result.events) < 5
+
+
 def test_a_box_that_falls_on_its_face_comes_to_rest_on_four_corners():
     scene = dap.Scene(name="box")
     scene.add_body("box", mass=1.0, Jp=[0.01] * 3, r=[0.0, 0.0, 0.25])
