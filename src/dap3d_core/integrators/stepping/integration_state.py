@@ -144,6 +144,7 @@ class IntegrationState(Arrays):
     crossing_count = _integer()
     stiffness_stage = _integer()  # a setting
     stops_when_stiff = _integer()  # a setting
+    stops_when_slow = _integer()  # a setting: another integration may go on with slow slip
     stiff_steps = _integer()  # and those in a row since that were not (stiffness.py)
     nonstiff_steps = _integer()
     stalled_steps = _integer()  # in a row, too short to change a switch by a bit
@@ -177,7 +178,7 @@ REAL_SETTINGS = ("rtol", "fixed_step", "exponent", "beta", "factor_min", "factor
                  "widest_gap_abscissa", "safety", "longest_step")  # fmt: skip
 INTEGER_SETTINGS = ("stage_count", "order", "error_size", "estimate_count",
                     "error_uses_last_stage", "has_dense_output", "projects", "calls_accepted",
-                    "switch_count", "stiffness_stage", "stops_when_stiff",
+                    "switch_count", "stiffness_stage", "stops_when_stiff", "stops_when_slow",
                     "sampled_switch_count", "follows_steps")  # fmt: skip
 #: Nothing is counted beyond: a count, and twice that, are exact in double precision.
 MOST_COUNTED = 2**52

@@ -29,6 +29,8 @@ FAILED, NEAR_SINGULAR = 1.0, 2.0
 #: Steps that are a smaller part of the run, on average over so many attempts, stall it; after so
 #: many right-hand sides, times components, about a second, it ends.
 STALLED_STEP, ATTEMPTS, STALL_WORK = 1e-9, 1000, 10_000_000
+#: The same part where another integration may go on with slow slip; so many attempts are enough.
+SLOW_STEP = 1e-8
 
 
 @compiled
@@ -155,6 +157,8 @@ def is_stalled(work: Any) -> bool:
     work.attempt_count = 0
     done, work.t_attempted = work.t - work.t_attempted, work.t
     asked = min(work.times[-1] - work.times[0], work.step_limit - work.t)
+    if work.stops_when_slow != 0 and done < ATTEMPTS * SLOW_STEP * asked:
+        return True
     if done > ATTEMPTS * STALLED_STEP * asked or work.fixed_step != 0.0:
         work.stall_start = work.rhs_count
     return (work.rhs_count - work.stall_start) * work.state.shape[1] > STALL_WORK

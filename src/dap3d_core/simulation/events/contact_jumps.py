@@ -148,16 +148,17 @@ class ContactJumps(Jumps):
         s.round_count, self.repeats = of.round_count, True
 
     def follow(self, integration: Integration) -> None:
-        """Where steps have become too short for the run to come to an end: slip jams, or it ends.
+        """Where steps have become too short for the run to come to an end: slip jams, or is stiff.
 
         Raises:
             SimulationError: it ends.
         """
         steps, t = integration.statistics.steps, integration.t
         (before, since), span = self._stood, self._span_of(integration)
-        if t - since > SLOW * span or steps < before:
+        is_stalled = integration.status is Status.STALLED and not integration.implicit
+        if not is_stalled and (t - since > SLOW * span or steps < before):
             self._stood = (steps, t)
-        elif steps - before > MOST_STEPS:
+        elif is_stalled or steps - before > MOST_STEPS:
             s, table, u = self.arrays, self.table, self._state_of(integration)
             modes = self._evaluator.states[table.mode]
             self._put_rows(integration)
@@ -168,6 +169,8 @@ class ContactJumps(Jumps):
             s.jammed = nearly_jams(s)
             if s.jammed >= 0:
                 self._stood, integration.work.status = (steps, t), Status.JUMPED
+                return
+            if is_stalled and (integration.work.stops_when_slow or not closed):
                 return
             names = [self.table.names[c] for c in closed]
             slowest = (
