@@ -47,11 +47,13 @@ def hand_over(run: RunState) -> bool:
     before such a pose, once. Of slow slip it is the other way round.
     """
     present, settings, left = run.present, run.settings, np.inf
-    if present.status in (Status.STIFF, Status.RUNNING):
+    if _leaves_slip(run):
+        pass
+    elif present.status in (Status.STIFF, Status.RUNNING):
         run.until = np.inf
         if present.status is Status.RUNNING:
             present.work.status = Status.FINISHED
-    elif not _leaves_slip(run):
+    else:
         left = _left(run)
         has_just_begun = len(run.integrations) > 1 and run.integrations[0].t >= present.t
         if left == np.inf or has_just_begun or settings.step or not settings.project:
@@ -75,7 +77,7 @@ def _leaves_slip(run: RunState) -> bool:
     if present.implicit and run.until < np.inf and present.status in FAILURES:
         run.until, first.stops_when_slow = np.inf, 0  # it does not get through either
         return True
-    if present.status is not Status.STALLED or not present.work.stops_when_slow:
+    if present.status is not Status.STIFF or not present.work.stops_when_slow:
         return False
     run.until = present.t + SLIPPING * run.t_end
     if SLOW_SLIP not in run.notes:
@@ -86,7 +88,7 @@ def _leaves_slip(run: RunState) -> bool:
 def switch_integrator(run: RunState) -> None:
     """Continue with the other one of the explicit and the implicit integrator."""
     present = run.present
-    if present.status is Status.STIFF and not present.implicit:
+    if not present.implicit and run.until == np.inf:
         until = f"{EXPLICIT.name} until t = {present.t:.6g} s"
         note = f"integrator auto: {until}, then {IMPLICIT.name}: {WHY_STIFF}"
         run.notes.append(information(note))
@@ -107,7 +109,7 @@ def take_over(integration: Integration, before: Integration) -> None:
     work.near_singular_landings = work.stalled_steps = 0
     work.stiff_steps = work.nonstiff_steps = work.attempt_count = 0
     work.t_attempted, work.stall_start = before.t, work.rhs_count
-    if not integration.implicit:
+    if hasattr(work, "lengths"):
         forget_measures(work)
     integration.restart()
 

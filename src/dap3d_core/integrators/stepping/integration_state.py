@@ -148,6 +148,7 @@ class IntegrationState(Arrays):
     stiff_steps = _integer()  # and those in a row since that were not (stiffness.py)
     nonstiff_steps = _integer()
     stalled_steps = _integer()  # in a row, too short to change a switch by a bit
+    near_switch = _integer()  # for which a step was made short last; -1 of none
     attempt_count = _integer()  # of steps, since t_attempted
     stall_start = _integer()  # rhs_count where steps became too short for the run to end
     rounding_state = _integer()  # of errors: 1 to be measured, 2 dominant (rounding.py)
@@ -194,7 +195,7 @@ def allowed_integers(work: Any, found: Any) -> dict[str, Container[int]]:
     instants, switches = work.times.size, work.switches.shape[1]
     running = found["status"] == RUNNING
     by_switch = {SWITCHED, CHATTERED} if switches else set()
-    by_method = {STIFF} if work.stops_when_stiff else set()
+    by_method = {STIFF} if work.stops_when_stiff or work.stops_when_slow else set()
     most_steps = 0
     if work.fixed_step != 0.0:
         most_steps = math.ceil((work.times[-1] - work.times[0]) / work.fixed_step) + 1
@@ -208,6 +209,7 @@ def allowed_integers(work: Any, found: Any) -> dict[str, Container[int]]:
         "segment_step": range(found["segment_step_count"] + 1),
         "end_status": {0, Status.ENDED, *by_switch},
         "terminal_switch": range(max(1, switches)),
+        "near_switch": range(-1, max(1, switches)),
         **dict.fromkeys(
             ("step_count", "rejected_count", "rhs_count", "projection_count", "report_count",
              "near_singular_landings", "cut_attempts", "crossing_count", "stiff_steps",

@@ -46,6 +46,8 @@ MOST_CHANGES, WITHIN = 2000, 1e-4
 MOST_JAMS, RATTLING = 500, 1e-2
 #: So many steps within this part of the run are too many: it would not come to an end.
 MOST_STEPS, SLOW = 10_000, 1e-5
+#: Slip, m/s, that may be stiff.
+STIFF_SLIP = 1e-4
 #: Records of changes from one mode to another.
 CHANGES = {(0, 1): "touch", (0, 2): "touch", (1, 0): "lift", (2, 0): "lift", (1, 2): "stick",
            (2, 1): "slip"}  # fmt: skip
@@ -155,7 +157,8 @@ class ContactJumps(Jumps):
         """
         steps, t = integration.statistics.steps, integration.t
         (before, since), span = self._stood, self._span_of(integration)
-        is_stalled = integration.status is Status.STALLED and not integration.implicit
+        is_slow = integration.status is Status.STIFF
+        is_stalled = is_slow or (integration.status is Status.STALLED and not integration.implicit)
         if not is_stalled and (t - since > SLOW * span or steps < before):
             self._stood = (steps, t)
         elif is_stalled or steps - before > MOST_STEPS:
@@ -170,7 +173,9 @@ class ContactJumps(Jumps):
             if s.jammed >= 0:
                 self._stood, integration.work.status = (steps, t), Status.JUMPED
                 return
-            if is_stalled and (integration.work.stops_when_slow or not closed):
+            if is_slow and not np.any(sliding < STIFF_SLIP):
+                integration.work.status = Status.RUNNING
+            if is_slow or not closed:
                 return
             names = [self.table.names[c] for c in closed]
             slowest = (
