@@ -259,11 +259,11 @@ def test_inverse_dynamics_hold_within_the_ellipse(pull, holds):
     del scene.forces["g"]
     scene.add_force("weight", "g", gravity=G, wgt=[*pull, -1.0])
     t = np.linspace(0.0, 1.0, 6)
-    still = {name: 0.0 * t for name in ("r.x", "r.y", "r.z", "p.e1", "p.e2", "p.e3")}
-    motion = {"t": t} | {f"b.{name}": value for name, value in still.items()}
+    places = ("r.x", "r.y", "r.z", "p.e1", "p.e2", "p.e3")
+    motion = {"t": t} | {f"b.{name}": 0.0 * t for name in places}
     found = dap.inverse(dap.compile(scene, registry=REGISTRY), motion, actuators=[])
     needed = -MASS * G * np.array([*pull, 0.0])
-    assert not any("cannot do its part" in note for note in found.notes) == holds
+    assert any("cannot do its part" in note for note in found.notes) != holds
     assert found.contact("floor").friction[2] == pytest.approx(needed, abs=1e-9)
 
 
