@@ -47,7 +47,9 @@ def test_more_inputs(name):
                                     1_048_577, 1_159_636, 2021,
                                     1_650_876, 14_923_612, 10_445_297, 11_594_543, 18_897_519,
                                     8_897_954, 13_400_462, 21_657_220, 25_366_246, 8_355_428,
-                                    25_901_617, 28_577_788, 13_822_892])  # fmt: skip
+                                    25_901_617, 28_577_788, 13_822_892,
+                                    26_078_414, 27_019_585, 25_987_196, 21_456_175,
+                                    8_003_505])  # fmt: skip
 def test_contacts_that_once_ended_falsely(number):
     """As "ever faster", by steps as short as rounding, with a force that pulls, or overlapping.
 

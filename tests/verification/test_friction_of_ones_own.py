@@ -250,3 +250,28 @@ def test_two_coefficients_without_a_grain_are_refused():
 
     with pytest.raises(PluginError, match="or those along a vector grain and across it"):
         examine(Lost)
+
+
+@pytest.mark.parametrize(("pull", "holds"), [((0.1, 0.4), True), ((0.19, 0.2), False)])
+def test_inverse_dynamics_hold_within_the_ellipse(pull, holds):
+    """Pulls, in parts of the weight, that need 0.94 and 1.03 of the ellipse."""
+    scene = block("test-runner", **ELLIPSE)
+    del scene.forces["g"]
+    scene.add_force("weight", "g", gravity=G, wgt=[*pull, -1.0])
+    t = np.linspace(0.0, 1.0, 6)
+    places = ("r.x", "r.y", "r.z", "p.e1", "p.e2", "p.e3")
+    motion = {"t": t} | {f"b.{name}": 0.0 * t for name in places}
+    found = dap.inverse(dap.compile(scene, registry=REGISTRY), motion, actuators=[])
+    needed = -MASS * G * np.array([*pull, 0.0])
+    assert any("cannot do its part" in note for note in found.notes) != holds
+    assert found.contact("floor").friction[2] == pytest.approx(needed, abs=1e-9)
+
+
+def test_inverse_dynamics_find_friction_of_a_slip_in_an_ellipse():
+    """As the run whose motion it is."""
+    scene = block("test-runner", (1.0, 1.5, 0.0), **ELLIPSE)
+    compiled = dap.compile(scene, registry=REGISTRY)
+    result = dap.simulate(compiled, t_end=0.2, dt=0.05, **TIGHT)
+    found = dap.inverse(compiled, result, actuators=[])
+    one, other = result.contact("floor"), found.contact("floor")
+    assert np.abs(one.friction - other.friction).max() < 1e-9

@@ -1,8 +1,11 @@
-"""Integrations that take a run over from each other: where it is stiff, and at singular poses.
+"""Integrations that take a run over from each other: where it is stiff, at singular poses, at slip.
 
 The iteration of Radau IIA does not converge where a weak singular value of the constraints changes
 its sign, and its steps stop short of it. Those of dop853 are placed about it
 (integrators/stepping/singular_poses.py, docs/decisions/0007), so it takes the run across.
+
+Slip of contacts that begins with no acceleration is stiff while it is slow (docs/decisions/0097):
+where an explicit integration does not get on, Radau IIA takes the run to where it is faster.
 """
 
 from collections.abc import Sequence
@@ -27,6 +30,12 @@ APART = 1e-5
 BEHIND = 3.0
 #: A length that goes to zero with a higher power of the time left than this is not near zero.
 HIGHEST = 6.0
+#: Part of the run in which slip that has begun becomes fast enough for explicit steps.
+SLIPPING = 1e-4
+SLOW_SLIP = information(
+    "explicit steps became too short, as slip asks for that begins with next to no acceleration: "
+    f"{IMPLICIT.name} took the run on until it was faster"
+)
 #: How an integration ends that does not get through a singular pose.
 FAILURES = (Status.STEP_FLOOR, Status.NOT_FINITE, Status.PROJECTION_FAILED, Status.STALLED)
 
@@ -35,10 +44,12 @@ def hand_over(run: RunState) -> bool:
     """Let the other integration go on where the present one leaves the run to it; whether so.
 
     An explicit one does where the scene is stiff, or behind a singular pose; an implicit one
-    before such a pose, once.
+    before such a pose, once. Of slow slip it is the other way round.
     """
     present, settings, left = run.present, run.settings, np.inf
-    if present.status in (Status.STIFF, Status.RUNNING):
+    if _leaves_slip(run):
+        pass
+    elif present.status in (Status.STIFF, Status.RUNNING):
         run.until = np.inf
         if present.status is Status.RUNNING:
             present.work.status = Status.FINISHED
@@ -60,10 +71,24 @@ def hand_over(run: RunState) -> bool:
     return True
 
 
+def _leaves_slip(run: RunState) -> bool:
+    """Whether slow slip stops the present integration; sets ``until`` when another goes on."""
+    present, first = run.present, run.integrations[0].work
+    if present.implicit and run.until < np.inf and present.status in FAILURES:
+        run.until, first.stops_when_slow = np.inf, 0  # it does not get through either
+        return True
+    if present.status is not Status.STIFF or not present.work.stops_when_slow:
+        return False
+    run.until = present.t + SLIPPING * run.t_end
+    if SLOW_SLIP not in run.notes:
+        run.notes.append(SLOW_SLIP)
+    return True
+
+
 def switch_integrator(run: RunState) -> None:
     """Continue with the other one of the explicit and the implicit integrator."""
     present = run.present
-    if not present.implicit:
+    if not present.implicit and run.until == np.inf:
         until = f"{EXPLICIT.name} until t = {present.t:.6g} s"
         note = f"integrator auto: {until}, then {IMPLICIT.name}: {WHY_STIFF}"
         run.notes.append(information(note))
@@ -84,7 +109,7 @@ def take_over(integration: Integration, before: Integration) -> None:
     work.near_singular_landings = work.stalled_steps = 0
     work.stiff_steps = work.nonstiff_steps = work.attempt_count = 0
     work.t_attempted, work.stall_start = before.t, work.rhs_count
-    if not integration.implicit:
+    if hasattr(work, "lengths"):
         forget_measures(work)
     integration.restart()
 

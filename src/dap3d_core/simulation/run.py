@@ -243,16 +243,17 @@ class Run(RunState):
         }
         integrator = integrator_named(settings.integrator)
         check_fit(integrator, evaluator.formulation)
+        may_change = fits(IMPLICIT, evaluator.formulation) and not self.shared_laws
+        may_change &= not evaluator.model.breaks
+        slips = evaluator.model.contact_count > 0
         if settings.integrator == "auto":
-            options = options | {
-                "stop_when_stiff": fits(IMPLICIT, evaluator.formulation)
-                and not self.shared_laws
-                and not (evaluator.model.contact_count or evaluator.model.breaks)
-            }
+            options = options | {"stop_when_stiff": may_change and not slips}
         try:
             integration = integrator.make(evaluator, y0, self.times, **options)
         except ValueError as error:
             raise SceneError([Mistake("step", settings.step, str(error))]) from error
+        explicit = integration.adaptive and not integration.implicit
+        integration.work.stops_when_slow = may_change and slips and explicit and not settings.step
         if singular is not None:
             first = singular.first_step * (1.0 if self.limits is None else SECOND_RUN_FACTOR)
             begin_singular(integration.work, evaluator.rates(0.0, u0, singular.acceleration), first)

@@ -142,7 +142,9 @@ def distance_to_crossing(work: IntegrationState, h: float, short: float) -> floa
         left = time_to_zero(value - near_edge(s, k), rate, bend)
         if left < longest:
             doubt = 0.5 * left * bend / rate if rate < 0.0 else 1.0
-            h = min(h, left * (1.0 - min(MAX_CROSSING_MARGIN, CROSSING_MARGIN + doubt * doubt)))
+            left *= 1.0 - min(MAX_CROSSING_MARGIN, CROSSING_MARGIN + doubt * doubt)
+            if left < h:
+                h, work.near_switch = left, k
     return h
 
 
@@ -185,7 +187,9 @@ def cut_step(work: IntegrationState, row: int, h: float) -> None:
         value, rate, found = side * s[VALUE, k], side * s[RATE, k], side * s[row, k]
         if side != 0.0 and found <= edge:
             bend = 2.0 * (found - value - rate * h) / (h * h)
-            left = min(left, time_to_zero(value - edge, rate, bend))
+            crosses = time_to_zero(value - edge, rate, bend)
+            if crosses <= left:
+                left, work.near_switch = crosses, k
     work.cut_attempts += 1
     work.rejected_count += 1
     # samples are as good as the stages they belong to: trusted less from attempt to attempt
@@ -213,7 +217,8 @@ def end_is_across(
         side = s[SIDE, k]
         low = cubic_minimum(side * s[VALUE, k], h * side * s[RATE, k], side * s[FOUND, k],
                             h * side * s[FOUND_RATE, k])  # fmt: skip
-        part = min(part, low)
+        if low < part:
+            part, work.near_switch = low, k
     if part == 1.0:
         return False
     work.cut_attempts += 1
@@ -261,12 +266,12 @@ def update_switches_after_step(
     work.step_limit_at_switch = np.inf
     if work.switch_count == 0:
         return
-    stalled = 0
+    stalled, is_short = 0, (work.cut_attempts > 0) | (h < CUT_SHORT * work.uncut_step)
+    if not is_short:
+        work.near_switch = -1
     for k in range(s.shape[1]):
-        is_short = (work.cut_attempts > 0) | (h < CUT_SHORT * work.uncut_step)
-        is_stalled = is_short & (s[FOUND, k] == s[VALUE, k])
-        approaches = (s[SIDE, k] * s[RATE, k] < 0.0) | (s[DOES, k] >= JUMPS)  # or its rate is noise
-        stalled |= is_stalled & approaches
+        approaches = (s[SIDE, k] * s[RATE, k] < 0.0) | may_rest(s, k)  # or its rate is noise
+        stalled |= is_short & approaches & (s[FOUND, k] == s[VALUE, k]) & (k == work.near_switch)
         s[BEND, k] = (s[FOUND_RATE, k] - s[RATE, k]) / h
         s[VALUE, k], s[RATE, k] = s[FOUND, k], s[FOUND_RATE, k]
         if s[SIDE, k] == 0.0:

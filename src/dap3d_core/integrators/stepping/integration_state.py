@@ -144,9 +144,11 @@ class IntegrationState(Arrays):
     crossing_count = _integer()
     stiffness_stage = _integer()  # a setting
     stops_when_stiff = _integer()  # a setting
+    stops_when_slow = _integer()  # a setting: another integration may go on with slow slip
     stiff_steps = _integer()  # and those in a row since that were not (stiffness.py)
     nonstiff_steps = _integer()
     stalled_steps = _integer()  # in a row, too short to change a switch by a bit
+    near_switch = _integer()  # for which a step was made short last; -1 of none
     attempt_count = _integer()  # of steps, since t_attempted
     stall_start = _integer()  # rhs_count where steps became too short for the run to end
     rounding_state = _integer()  # of errors: 1 to be measured, 2 dominant (rounding.py)
@@ -177,7 +179,7 @@ REAL_SETTINGS = ("rtol", "fixed_step", "exponent", "beta", "factor_min", "factor
                  "widest_gap_abscissa", "safety", "longest_step")  # fmt: skip
 INTEGER_SETTINGS = ("stage_count", "order", "error_size", "estimate_count",
                     "error_uses_last_stage", "has_dense_output", "projects", "calls_accepted",
-                    "switch_count", "stiffness_stage", "stops_when_stiff",
+                    "switch_count", "stiffness_stage", "stops_when_stiff", "stops_when_slow",
                     "sampled_switch_count", "follows_steps")  # fmt: skip
 #: Nothing is counted beyond: a count, and twice that, are exact in double precision.
 MOST_COUNTED = 2**52
@@ -193,7 +195,7 @@ def allowed_integers(work: Any, found: Any) -> dict[str, Container[int]]:
     instants, switches = work.times.size, work.switches.shape[1]
     running = found["status"] == RUNNING
     by_switch = {SWITCHED, CHATTERED} if switches else set()
-    by_method = {STIFF} if work.stops_when_stiff else set()
+    by_method = {STIFF} if work.stops_when_stiff or work.stops_when_slow else set()
     most_steps = 0
     if work.fixed_step != 0.0:
         most_steps = math.ceil((work.times[-1] - work.times[0]) / work.fixed_step) + 1
@@ -207,6 +209,7 @@ def allowed_integers(work: Any, found: Any) -> dict[str, Container[int]]:
         "segment_step": range(found["segment_step_count"] + 1),
         "end_status": {0, Status.ENDED, *by_switch},
         "terminal_switch": range(max(1, switches)),
+        "near_switch": range(-1, max(1, switches)),
         **dict.fromkeys(
             ("step_count", "rejected_count", "rhs_count", "projection_count", "report_count",
              "near_singular_landings", "cut_attempts", "crossing_count", "stiff_steps",

@@ -29,6 +29,8 @@ FAILED, NEAR_SINGULAR = 1.0, 2.0
 #: Steps that are a smaller part of the run, on average over so many attempts, stall it; after so
 #: many right-hand sides, times components, about a second, it ends.
 STALLED_STEP, ATTEMPTS, STALL_WORK = 1e-9, 1000, 10_000_000
+#: The same part where another integration may go on with slow slip; so many attempts are enough.
+SLOW_STEP = 1e-8
 
 
 @compiled
@@ -106,11 +108,10 @@ def may_step(
                 continue
             if work.t >= work.step_limit:
                 return False
-            if not is_stalled(work):
+            pace = judge_pace(work)
+            if pace == RUNNING:
                 return True
-            work.t_stop, work.status = work.t, STALLED
-            if work.stops_when_stiff != 0:  # the other integration may get on
-                work.status = STIFF
+            work.t_stop, work.status = work.t, pace
     return False
 
 
@@ -144,20 +145,24 @@ def pass_stop(
 
 
 @compiled
-def is_stalled(work: Any) -> bool:
-    """True if steps are so short that the run would not end, for about a second of work.
+def judge_pace(work: Any) -> int:
+    """STALLED if steps are so short that the run would not end, for about a second of work.
 
-    Called before each attempt. What is to be reached is ``step_limit``, or the end of the run.
+    STIFF where another integration may get on; else RUNNING. Called before each attempt. What is to
+    be reached is ``step_limit``, or the end of the run.
     """
     work.attempt_count += 1
     if work.attempt_count < ATTEMPTS:
-        return False
+        return RUNNING
     work.attempt_count = 0
     done, work.t_attempted = work.t - work.t_attempted, work.t
     asked = min(work.times[-1] - work.times[0], work.step_limit - work.t)
     if done > ATTEMPTS * STALLED_STEP * asked or work.fixed_step != 0.0:
         work.stall_start = work.rhs_count
-    return (work.rhs_count - work.stall_start) * work.state.shape[1] > STALL_WORK
+    if (work.rhs_count - work.stall_start) * work.state.shape[1] > STALL_WORK:
+        return STALLED if work.stops_when_stiff == 0 else STIFF
+    is_slow = work.stops_when_slow != 0 and done < ATTEMPTS * SLOW_STEP * asked
+    return STIFF if is_slow else RUNNING
 
 
 @compiled_into

@@ -296,6 +296,7 @@ class PreparedRun:
             run.stops = [(stop.t, stop.jumps) for stop in self.stops]
             run.initialise()
             integrations = [run.present]
+            run.present.work.stops_when_slow = 0
             if run.present.work.stops_when_stiff:
                 options = run.options | {"first_step": None}
                 second = IMPLICIT.make(self.evaluator, run.present.y, run.times, **options)

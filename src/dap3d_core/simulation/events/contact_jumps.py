@@ -47,6 +47,8 @@ MOST_CHANGES, WITHIN = 2000, 1e-4
 MOST_JAMS, RATTLING = 500, 1e-2
 #: So many steps within this part of the run are too many: it would not come to an end.
 MOST_STEPS, SLOW = 10_000, 1e-5
+#: Slip, m/s, that may be stiff.
+STIFF_SLIP = 1e-4
 #: Records of changes from one mode to another.
 CHANGES = {(0, 1): "touch", (0, 2): "touch", (1, 0): "lift", (2, 0): "lift", (1, 2): "stick",
            (2, 1): "slip"}  # fmt: skip
@@ -149,16 +151,18 @@ class ContactJumps(Jumps):
         s.round_count, self.repeats = of.round_count, True
 
     def follow(self, integration: Integration) -> None:
-        """Where steps have become too short for the run to come to an end: slip jams, or it ends.
+        """Where steps have become too short for the run to come to an end: slip jams, or is stiff.
 
         Raises:
             SimulationError: it ends.
         """
         steps, t = integration.statistics.steps, integration.t
         (before, since), span = self._stood, self._span_of(integration)
-        if t - since > SLOW * span or steps < before:
+        is_slow = integration.status is Status.STIFF
+        is_stalled = is_slow or (integration.status is Status.STALLED and not integration.implicit)
+        if not is_stalled and (t - since > SLOW * span or steps < before):
             self._stood = (steps, t)
-        elif steps - before > MOST_STEPS:
+        elif is_stalled or steps - before > MOST_STEPS:
             s, table, u = self.arrays, self.table, self._state_of(integration)
             modes = self._evaluator.states[table.mode]
             self._put_rows(integration)
@@ -169,6 +173,10 @@ class ContactJumps(Jumps):
             s.jammed = nearly_jams(s)
             if s.jammed >= 0:
                 self._stood, integration.work.status = (steps, t), Status.JUMPED
+                return
+            if is_slow and not np.any(sliding < STIFF_SLIP):
+                integration.work.status = Status.RUNNING
+            if is_slow or not closed:
                 return
             names = [self.table.names[c] for c in closed]
             slowest = (

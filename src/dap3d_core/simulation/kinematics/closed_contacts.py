@@ -4,7 +4,6 @@ import attrs
 import numpy as np
 
 from dap3d_core.formulations.contacts.contact_table import GAP, REACH, ContactTable, find_grips
-from dap3d_core.formulations.contacts.forces import against
 from dap3d_core.formulations.contacts.rows import put_rows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
@@ -66,6 +65,8 @@ class Closed:
         known: (6 n,) friction of a size of its own that slides.
         cones: contact -> the cone that its forces are in, with those of what resists at it.
         Lam: (k,) row among those of contacts of each unknown force.
+        scale: (k,) force or moment, N or N m, for which one of each stands: an ellipse of friction
+            is a disc where that across the grain is stretched.
         states: of elements, with modes and directions of sliding.
         loaded: the same where friction of joints, by their load, alone acts.
         load: contact -> by what that size is multiplied: the load that its joint was found to have.
@@ -75,6 +76,7 @@ class Closed:
     known: Floats
     cones: dict[int, Cone]
     Lam: list[int]
+    scale: list[float]
     states: Floats
     loaded: Floats
     load: dict[int, float]
@@ -110,7 +112,8 @@ class ContactForces:
         put_rows(float(t), s, evaluator.system, evaluator.loops)
         still, slip, G = STILL * table.length, s.slip, s.J[len(s.lam_free) :]
         near = (np.abs(outputs[:, GAP]) < CLOSED * table.length) & (outputs[:, REACH] >= 0.0)
-        columns, places, known = list[Floats](), list[int](), np.zeros(len(s.v))
+        columns, places, scale = list[Floats](), list[int](), list[float]()
+        known = np.zeros(len(s.v))
         cones: dict[int, Cone] = {}
         states, loaded = table.evaluator.states.copy(), table.evaluator.states.copy()
         closed = (near & (np.abs(slip[:, 0]) < still)) | table.alone
@@ -122,7 +125,10 @@ class ContactForces:
             size = float(np.linalg.norm(slip[c, across]))
             sliding = size > still[c]
             way = slip[c, across] / size if sliding else 0.0 * slip[c, across]
-            acts = way if s.ratio[c] == 1.0 else np.array(against(s.ratio[c], np.append(0.0, way)))
+            acts = way
+            if sliding and s.ratio[c] != 1.0:  # an ellipse
+                parts = np.array([1.0, s.ratio[c]])
+                acts = parts**2 * way / np.linalg.norm(parts * way)
             friction = -s.mu[c] * (acts @ tangents)
             cone = cones.get(under, Cone(None, []))
             if cone.normal is not None:
@@ -131,13 +137,16 @@ class ContactForces:
                 cone = Cone(len(places), [])
                 columns.append(G[3 * c] + friction)
                 places.append(3 * c)
+                scale.append(1.0)
             elif sliding and c not in table.loads:
                 known += friction
             first = len(places)
             for k, tangent in enumerate(tangents, across.start):
-                if not sliding and s.mu_s[c] > 0.0 and tangent.any():
-                    columns.append(tangent)
+                stretch = float(s.ratio_s[c]) if k == 2 else 1.0
+                if not sliding and s.mu_s[c] * stretch > 0.0 and tangent.any():
+                    columns.append(stretch * tangent)
                     places.append(3 * c + k)
+                    scale.append(stretch)
             cone.discs.append((list(range(first, len(places))), float(s.mu_s[c])))
             cones |= {c: cone} if under < 0 else {}
             for some in (states, loaded) if c in table.loads and sliding else (states,):
@@ -145,7 +154,7 @@ class ContactForces:
                 some[table.way[c]] = table.length[c] * way @ s.frames[c, across]
         wrenches = np.array(columns).reshape(-1, len(s.v)).T
         load = {c: np.inf if c in table.loads else 1.0 for c in cones}  # unknown at first
-        return Closed(wrenches, known, cones, places, states, loaded, load)
+        return Closed(wrenches, known, cones, places, scale, states, loaded, load)
 
     def within(self, closed: Closed, t: float, A: Floats, side: Floats, x: Floats) -> Floats:
         """Forces x (k,) with A x as near to side: within the cones, where they leave a choice.

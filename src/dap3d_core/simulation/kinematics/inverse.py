@@ -104,7 +104,7 @@ class Balance:
                 self.Lam[actuator.row] = force / actuator.size(rows.all_rows)
         if closed is not None and self.contacts is not None:
             first = len(self.held) - 3 * self.contacts.table.count
-            self.Lam[first + np.array(closed.Lam, dtype=int)] = forces[count:]
+            self.Lam[first + np.array(closed.Lam, dtype=int)] = closed.scale * forces[count:]
 
     def _least(self, wrenches: Floats, needed: Floats) -> tuple[Floats, int]:
         """Forces of least norm with N^T B tau nearest to what is needed, and the rank."""

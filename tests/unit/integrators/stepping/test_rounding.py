@@ -5,7 +5,7 @@ import pytest
 from support.internals import KIND, NOISE, Y
 
 from dap3d_core.integrators import TABLEAUS, RungeKutta
-from dap3d_core.integrators.stepping.output import ATTEMPTS, STALL_WORK, is_stalled
+from dap3d_core.integrators.stepping.output import ATTEMPTS, STALL_WORK, judge_pace
 from dap3d_core.integrators.stepping.rounding import judge_noise
 from dap3d_core.integrators.stepping.vector_ops import scaled_largest
 
@@ -46,7 +46,7 @@ def test_noise_far_below_the_tolerances_is_forgotten():
 def attempts(work, count, step, rhs):
     """Attempts of so long a step and so many right-hand sides; after how many the run stalls."""
     for k in range(count):
-        if is_stalled(work):
+        if judge_pace(work):
             return k
         work.t += step
         work.rhs_count += rhs

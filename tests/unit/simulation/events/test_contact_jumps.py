@@ -282,6 +282,27 @@ def test_steps_that_lead_nowhere_stop_the_run_and_name_the_contact(monkeypatch):
     assert c.value.result is not None
 
 
+@long_in_plain_python
+def test_slip_that_is_stiff_is_taken_across_by_radau():
+    """A coin that falls over rolls, and slips again where its point of contact races around."""
+    scene = dap.Scene(name="coin")
+    c, s = np.cos(0.6), np.sin(0.6)
+    lean = np.array([0.0, -np.cos(1.2), -np.sin(1.2)])  # from its centre to its lowest point
+    w = np.array([0.0, 0.2, 0.2])
+    scene.add_body("coin", mass=2.0, Jp=[0.003, 0.003, 0.006], p=[c, s, 0, 0],
+                   r=[0, 0, 0.15 * np.sin(1.2)], r_dot=-0.15 * np.cross(w, lean), w=w)  # fmt: skip
+    scene.add_force("weight")
+    scene.add_contact("disk_plane", "rim", P_i="coin.O", a_i="coin.z", radius=0.15, mu=0.4)
+    exact = {"t_end": 0.3, "dt": 0.01, "rtol": 1e-10, "atol": 1e-12}
+    result = dap.simulate(scene, **exact, integrator="dop853")
+    again = dap.simulate(scene, **exact, integrator="radau")
+    assert any("took the run on until it was faster" in note for note in result.notes)
+    assert [e.kind for e in result.events] == ["touch", "slip", "stick", "slip"]
+    size = np.max(np.abs(result.w))
+    assert np.max(np.abs(result.w - again.w)) < 1e-8 * size  # of slip 100 times the tolerance
+    assert result.stats.steps < 8000
+
+
 def thrown_box():
     scene = dap.Scene(name="thrown")
     scene.add_material("rubber", mu=0.3, e=0.2)
