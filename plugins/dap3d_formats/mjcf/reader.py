@@ -32,6 +32,9 @@ from dap3d_formats.mjcf.geoms import Geoms
 #: Type -> kind of a joint.
 KINDS = {"hinge": "revolute", "slide": "prismatic", "ball": "ball", "free": "free"}
 
+#: Kinds with one coordinate.
+SCALAR = ("revolute", "prismatic")
+
 
 @attrs.define(eq=False)
 class MjcfReader:
