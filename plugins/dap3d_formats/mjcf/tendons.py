@@ -138,18 +138,29 @@ def _drawn(reader: MjcfReader, line: Tendon) -> float:
     return length_of_line(line, lambda link: pose_of(reader, link, at_rest))
 
 
-def pose_of(reader: MjcfReader, link: str, q: Mapping[str, float] | None = None) -> Frame:
-    """The pose of a link at coordinates of joints; where the file draws it for those without."""
-    pose = Frame()
-    while link != WORLD:
+def pose_of(
+    reader: MjcfReader, link: str, q: Mapping[str, float] | None = None,
+    poses: dict[str, Frame] | None = None,
+) -> Frame:  # fmt: skip
+    """The pose of a link.
+
+    Args:
+        reader: of the bodies.
+        link: its name.
+        q: coordinates of joints; the others are where the file draws them.
+        poses: those that have been found at these coordinates.
+    """
+    chain, q, poses = [], q or {}, {} if poses is None else poses
+    while link != WORLD and link not in poses:
         joint = next(j for j in reader.model.joints.values() if j.child == link and not j.closes)
-        if q and joint.name in q:
-            joint = held(joint, q[joint.name])
+        chain.append(held(joint, q[joint.name]) if joint.name in q else joint)
+        link = joint.parent
+    pose = poses.get(link, Frame())
+    for joint in reversed(chain):
         step = joint.in_parent @ joint.in_child.inverse()
         if joint.kind == "free":
-            place = joint.position
-            step = Frame(place[:3], from_quaternion(place[3:]))
-        pose, link = step @ pose, joint.parent
+            step = Frame(joint.position[:3], from_quaternion(joint.position[3:]))
+        pose = poses[joint.child] = pose @ step
     return pose
 
 
@@ -186,7 +197,8 @@ def length_range(reader: MjcfReader, line: Tendon) -> tuple[float, float]:
         q = dict(zip(free, x.tolist(), strict=True))
         for one in leads.values():
             q[one.joint] = one.at(q.get(one.other, 0.0))
-        return sign * length_of_line(line, lambda link: pose_of(reader, link, q))
+        poses: dict[str, Frame] = {}
+        return sign * length_of_line(line, lambda link: pose_of(reader, link, q, poses))
 
     start = np.clip(np.zeros(len(free)), *np.array(bounds).T)
     settings = {"eps": CHANGE, "ftol": DONE}
@@ -206,7 +218,8 @@ def slopes(reader: MjcfReader, line: Tendon) -> dict[str, float] | None:
         return None
 
     def length(name: str, q: float) -> float:
-        return length_of_line(line, lambda link: pose_of(reader, link, {name: q}))
+        poses: dict[str, Frame] = {}
+        return length_of_line(line, lambda link: pose_of(reader, link, {name: q}, poses))
 
     return {n: (length(n, CHANGE) - length(n, -CHANGE)) / (2.0 * CHANGE) for n in movers}
 
