@@ -27,6 +27,8 @@ FRICTION = (1.0, 0.005, 0.0001)
 FLAT = ("plane", "hfield", "sdf")
 #: Density of geoms, kg/m^3.
 WATER = 1000.0
+#: Angle by which a quarter turn may be off, rad: meshes in files have fewer digits.
+SKEW = 1e-7
 #: Group from which geoms are hidden at first, as those of contacts are.
 HIDDEN = 3
 
@@ -117,13 +119,16 @@ class Geoms:
         if path is None:
             return None
         inner, scale = _reference(asset).inverse(), asset.numbers("scale", 3, (1.0, 1.0, 1.0))
-        if len(set(scale)) > 1 and not np.array_equal(inner.A, np.eye(3)):
+        inner = Frame(np.array(scale) * inner.r, inner.A)
+        along_axes = np.abs(inner.A).argmax(axis=0)
+        skew = np.abs(np.abs(inner.A) - np.eye(3)[:, along_axes]).max()
+        if len(set(scale)) > 1 and skew > SKEW:
             meets = common["contact"] is not None
-            text = "refquat of <mesh> with a scale of unlike factors: not drawn"
-            text += " and meets no others" if meets else ""
+            text = "refquat of <mesh> that is no quarter turn, with a scale of unlike factors: "
+            text += f"not drawn{', and meets no others' if meets else ''}"
             self.document.source.remarks.leave_out(geom.place, text, motion=meets)
             return None
-        inner = Frame(np.array(scale) * inner.r, inner.A)
+        scale = tuple(scale[k] for k in along_axes)  # it is scaled before it is turned
         pose = frame @ self.document.frame(geom) @ inner
         return Geometry("mesh", mesh=path, scale=scale, pose=pose, **common)
 
