@@ -1,7 +1,7 @@
 """Reads bodies, joints and geoms of MJCF."""
 
 from collections.abc import Iterator
-from math import inf
+from math import inf, pi
 from typing import Any
 
 import attrs
@@ -298,7 +298,8 @@ class MjcfReader:
         if (low, high) != UNBOUNDED and not self.document.disables("limit", "constraint"):
             limited = element.get("limited", "auto")
             if joint.kind == "ball":
-                joint.limits = (Limits(upper=self.document.angle(high, element)),)
+                greatest = self.document.angle(max(low, high), element)
+                joint.limits = (Limits(0.0, greatest) if greatest < pi else Limits(),)
             elif low != high or limited == "true":  # of equal ones MuJoCo makes no limit
                 joint.limits = (Limits.between(turned(low) - reference, turned(high) - reference,
                                                joint.name, element.place),)  # fmt: skip
