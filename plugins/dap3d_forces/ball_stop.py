@@ -20,7 +20,7 @@ from dap3d_core.kernels import (
     transpose,
     where,
 )
-from dap3d_forces.ball_spring import BallSpring
+from dap3d_forces.ball_spring import BallSpring, turned
 from dap3d_forces.rebound import carried, reduced, stored
 from dap3d_forces.rotation_stop import inertia
 
@@ -61,7 +61,7 @@ class BallStop(Force):
 
     def prepare(self, bodies):
         p_c = BallSpring.prepare(self, bodies)["p_c"]
-        return {"axes": transpose(rotation_matrix(rotation_vector(p_c)))}
+        return {"p_c": p_c, "axes": transpose(rotation_matrix(rotation_vector(p_c)))}
 
     def wrench(A_i, A_j, axes, w_i, w_j, Jp_i, Jp_j, phi_stop, k, zeta, J_c):
         phi, u = turn(A_i, A_j, axes)
@@ -72,8 +72,9 @@ class BallStop(Force):
     def energy(A_i, A_j, axes, phi_stop, k):
         return stored(phi_stop - turn(A_i, A_j, axes)[0], k)
 
-    def switch(A_i, A_j, axes, phi_stop):
-        return phi_stop - turn(A_i, A_j, axes)[0]
+    def switch(A_i, A_j, axes, p_i, p_j, p_c, phi_stop):
+        # the second is zero at half a turn, where u jumps
+        return phi_stop - turn(A_i, A_j, axes)[0], turned(p_i, p_j, p_c)[0]
 
 
 class RigidBallStop(Contact, of=BallStop, k=False):
