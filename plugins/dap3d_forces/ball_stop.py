@@ -27,7 +27,7 @@ from dap3d_forces.rotation_stop import inertia
 interface_version = 1
 
 ZERO = (0.0, 0.0, 0.0)
-#: Square of half a turn below which its axis is not known; no stop is there.
+#: Square of a sine below which the axis of a turn is not known; no stop is there.
 SMALL = 1e-12
 
 
@@ -63,18 +63,18 @@ class BallStop(Force):
         p_c = BallSpring.prepare(self, bodies)["p_c"]
         return {"p_c": p_c, "axes": transpose(rotation_matrix(rotation_vector(p_c)))}
 
-    def wrench(A_i, A_j, axes, w_i, w_j, Jp_i, Jp_j, phi_stop, k, zeta, J_c):
-        phi, u = turn(A_i, A_j, axes)
+    def wrench(p_i, p_j, p_c, A_i, A_j, w_i, w_j, Jp_i, Jp_j, phi_stop, k, zeta, J_c):
+        phi, u = half_turns(p_i, p_j, p_c)
         m = where(J_c > 0.0, J_c, reduced(inertia(A_i, Jp_i, u), inertia(A_j, Jp_j, u)))
         M = scale(carried(phi_stop - phi, -dot(u, sub(w_j, w_i)), k, zeta, m), u)
         return (ZERO, M), (ZERO, neg(M))
 
-    def energy(A_i, A_j, axes, phi_stop, k):
-        return stored(phi_stop - turn(A_i, A_j, axes)[0], k)
+    def energy(p_i, p_j, p_c, phi_stop, k):
+        return stored(phi_stop - half_turns(p_i, p_j, p_c)[0], k)
 
-    def switch(A_i, A_j, axes, p_i, p_j, p_c, phi_stop):
+    def switch(p_i, p_j, p_c, phi_stop):
         # the second is zero at half a turn, where u jumps
-        return phi_stop - turn(A_i, A_j, axes)[0], turned(p_i, p_j, p_c)[0]
+        return phi_stop - half_turns(p_i, p_j, p_c)[0], turned(p_i, p_j, p_c)[0]
 
 
 class RigidBallStop(Contact, of=BallStop, k=False):
@@ -86,23 +86,34 @@ class RigidBallStop(Contact, of=BallStop, k=False):
     prepare = BallStop.prepare
 
     def gap(A_i, A_j, axes, phi_stop):
-        return phi_stop - turn(A_i, A_j, axes)[0]
+        return phi_stop - turns(A_i, A_j, axes)[0]
 
     def normal(A_i, A_j, axes):
-        return turn(A_i, A_j, axes)[1]
+        return turns(A_i, A_j, axes)[1]
 
 
-def turn(A_i, A_j, axes):
-    """Angle and axis of the turn from axes on body i to those of body j; z where there is none."""
-    columns = zip(axes, transpose(A_j), strict=True)
-    pairs = [(rotate(A_i, column), there) for column, there in columns]
+def half_turns(p_i, p_j, p_c):
+    """Angle and axis of the turn, of Euler parameters: of half of it sine and cosine."""
+    q, *e = turned(p_i, p_j, p_c)
+    sense = where(q < 0.0, -1.0, 1.0)
+    half, u = angle_axis(sense * q, scale(sense, e))
+    return 2.0 * half, u
+
+
+def turns(A_i, A_j, axes):
+    """Angle and axis of the turn from axes on body i to those of body j, whose rates are known."""
+    pairs = [(rotate(A_i, one), other) for one, other in zip(axes, transpose(A_j), strict=True)]
     x, y, z = (cross(*pair) for pair in pairs)
-    e = add(add(x, y), z)  # 2 sin(phi) u
-    cosine = 0.5 * (sum(dot(x, y) for x, y in pairs) - 1.0)
+    e, cosine = add(add(x, y), z), sum(dot(*pair) for pair in pairs) - 1.0  # both doubled
+    return angle_axis(cosine, e)
+
+
+def angle_axis(cosine, e):
+    """An angle and its axis, of multiples of its cosine and its sine, the latter along the axis."""
     small = norm2(e) < SMALL
-    size = sqrt(where(small, 1.0, norm2(e)))
-    u = tuple(where(small, w, x / size) for x, w in zip(e, (0.0, 0.0, 1.0), strict=True))
-    return atan2(where(small, 0.0, 0.5 * size), cosine), u
+    sine = sqrt(where(small, 1.0, norm2(e)))
+    u = tuple(where(small, w, x / sine) for x, w in zip(e, (0.0, 0.0, 1.0), strict=True))
+    return atan2(where(small, 0.0, sine), cosine), u
 
 
 @hookimpl
