@@ -115,7 +115,7 @@ def assert_same(one, other):
         assert one[key] == pytest.approx(other[key], rel=1e-13, abs=1e-14), key
 
 
-@pytest.mark.parametrize(
+CASES = pytest.mark.parametrize(
     ("which", "parts", "others"),
     [
         ("", ALL, LEGS),
@@ -123,12 +123,34 @@ def assert_same(one, other):
         ('body="upper"', UPPER, NO_LEGS),
     ],
 )
+
+
+@CASES
 def test_an_attached_model_is_as_if_it_were_written_there(tmp_path, which, parts, others):
     path = written(tmp_path, TOP.format(attach=ATTACH.format(which), key=""))
     (tmp_path / "one.xml").write_text(ONE.format(parts=parts, key="", **others))
     found = contents(path, tmp_path / "a")
     assert_same(found, contents(tmp_path / "one.xml", tmp_path / "b"))
     assert "x_upper" in found["bodies"]
+
+
+@CASES
+def test_mujoco_makes_the_same_of_both(tmp_path, which, parts, others):
+    """The one file is what it makes of the other: masses, places and accelerations in motion."""
+    mujoco = pytest.importorskip("mujoco")
+    written(tmp_path, TOP.format(attach=ATTACH.format(which), key=""))
+    (tmp_path / "one.xml").write_text(ONE.format(parts=parts, key="", **others))
+    found = []
+    for name in ("top.xml", "one.xml"):
+        model = mujoco.MjModel.from_xml_path(str(tmp_path / name))
+        data = mujoco.MjData(model)
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+        data.qpos[:] += np.linspace(0.1, 0.3, model.nq)
+        data.qvel[:], data.ctrl[:] = np.linspace(-0.1, 0.5, model.nv), 1.0
+        mujoco.mj_forward(model, data)
+        found.append((model.body_mass, data.xipos, data.qacc))
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12)
 
 
 def test_a_body_is_attached_without_the_frames_around_it(tmp_path):
