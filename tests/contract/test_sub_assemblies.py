@@ -20,8 +20,8 @@ TURN = Rotation.from_euler("xyz", RPY)
 #: The types that do not follow, and the slots of ground of which that is so; "" of any.
 MEASURED_FROM_GROUND = {"disk": "", "rP": "", "tyre": ""}
 LAID_BY_AXES = {
-    "oncurve": "j", "point-on-surface": "j", "bushing": "i", "sph_sd": "ij", "ball_box": "j",
-    "ball_surface": "j", "box_box": "ij", "box_plane": "i", "cylinder_plane": "i",
+    "oncurve": "j", "point-on-surface": "j", "bushing": "i", "sph_sd": "ij", "sph_stop": "ij",
+    "ball_box": "j", "ball_surface": "j", "box_box": "ij", "box_plane": "i", "cylinder_plane": "i",
     "disk_plane": "i", "point_curve": "j",
 }  # fmt: skip
 #: Their rows, off the constraint, go by a point of ground, or by axes that prepare chooses: they

@@ -1,6 +1,8 @@
 """Parts of MJCF files that belong to each other: options, replicas and tendons, muscles."""
 
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import dap3d_core as dap
 
@@ -56,3 +58,26 @@ def test_points_of_a_tendon_in_one_place_are_refused(tmp_path):
     text = BALLS.replace('"top" pos="0 0 2"', '"top" pos="0 0 0"')
     with pytest.raises(dap.SceneError, match="tendon rope0: two points that follow each other"):
         imported(tmp_path / "a.xml", text)
+
+
+@pytest.mark.parametrize("half", [(0.5, 0.5, 0.5, 0.5), (0.7071068, 0.0, -0.7071068, 0.0)])
+def test_a_mesh_that_is_scaled_after_a_quarter_turn(tmp_path, half):
+    """Each corner, moved and turned back by the reference, then scaled, then put in the body."""
+    corners = np.vstack([np.zeros(3), np.eye(3)])
+    faces = "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    lines = "".join(f"v {x} {y} {z}\n" for x, y, z in corners)
+    (tmp_path / "part.obj").write_text(lines + faces)
+    scene, report = imported(
+        tmp_path / "a.xml",
+        f"""<asset><mesh name="m" file="part.obj" scale="2 -3 4" refpos="0.1 0.2 0.3"
+        refquat="{" ".join(map(str, half))}"/></asset><worldbody><body pos="5 6 7"><freejoint/>
+        <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><geom type="mesh" mesh="m"/></body>
+        </worldbody>""",
+    )
+    assert not report.left_out
+    (shape,) = [one.fields for one in scene.shapes.values()]
+    A = Rotation.from_quat(np.roll(half, -1))
+    expected = [2.0, -3.0, 4.0] * A.inv().apply(corners - [0.1, 0.2, 0.3])
+    p = shape["p"]
+    found = Rotation.from_quat(np.roll(p, -1)).apply(np.array(shape["scale"]) * corners)
+    np.testing.assert_allclose(found + shape["at"], expected, rtol=0, atol=1e-12)

@@ -18,9 +18,8 @@ from dap3d_core.interface.formats import (
     XmlElement,
 )
 from dap3d_formats.mjcf.keyframes import Keyframe, actuators_of
-from dap3d_formats.mjcf.length_range import length_range, slopes
-from dap3d_formats.mjcf.reader import MjcfReader
-from dap3d_formats.mjcf.tendons import SCALAR, line_of, tendon_of
+from dap3d_formats.mjcf.reader import SCALAR, MjcfReader
+from dap3d_formats.mjcf.tendons import length_range, line_of, slopes, tendon_of
 
 #: Numbers of a muscle as MJCF has them in gainprm, with their defaults.
 MUSCLE = {"range": (0.75, 1.05), "force": (-1.0,), "scale": (200.0,), "lmin": (0.5,),

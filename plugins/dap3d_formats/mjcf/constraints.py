@@ -17,11 +17,9 @@ from dap3d_core.interface.formats import (
     held,
     length_of_line,
 )
-from dap3d_formats.mjcf.reader import MjcfReader
+from dap3d_formats.mjcf.reader import SCALAR, MjcfReader
 from dap3d_formats.mjcf.tendons import line_of, pose_of, tendon_of
 
-#: Joints with one coordinate.
-SCALAR = ("revolute", "prismatic")
 #: Limits of a joint that follows another are implied by those up to this part of their range.
 IMPLIED = 1e-3
 

@@ -1,6 +1,7 @@
 """An MJCF document: included files, settings of the compiler, default classes."""
 
 from math import pi
+from pathlib import Path
 from typing import Any
 
 import attrs
@@ -25,39 +26,32 @@ ACTUATORS = (
 
 
 @attrs.define(eq=False)
-class Document:
-    """A file with its included files, its compiler's settings and its default classes.
+class Settings:
+    """How a file says that its elements are read.
 
     Attributes:
-        root: the root.
-        compiler: attributes of <compiler>, of several the last.
+        compiler: the <compiler>, of several with the attributes of the last.
+        folder: where the names of its files start.
         defaults: class -> element -> attributes.
     """
 
-    source: Source
-    root: XmlElement
-    compiler: dict[str, str] = attrs.Factory(dict)
+    compiler: XmlElement
+    folder: Path
     defaults: dict[str, dict[str, dict[str, str]]] = attrs.Factory(lambda: {"main": {}})
 
     @classmethod
-    def of(cls, source: Source) -> "Document":
-        """The document of a file.
-
-        Raises:
-            FormatError: it cannot be read.
-        """
-        root = source.xml()
-        if root.name not in ("mujoco", "mujocoinclude"):
-            raise FormatError(f"an MJCF file is a <mujoco>, not a <{root.name}>", root.place)
-        _include(source, root)
-        document = cls(source, root)
+    def of(cls, root: XmlElement, folder: Path) -> "Settings":
+        """The settings of a file, with those of the files that it includes."""
+        given: dict[str, str] = {}
+        place = root.place
         for element in root.all("compiler"):
-            document.compiler |= element.attributes
-        if document.compiler.get("coordinate", "local") != "local":
-            raise FormatError('coordinate="global" is no longer a part of MJCF', root.place)
+            given, place = given | element.attributes, element.place
+        if given.get("coordinate", "local") != "local":
+            raise FormatError('coordinate="global" is no longer a part of MJCF', place)
+        settings = cls(XmlElement("compiler", given, place), folder)
         for element in root.all("default"):
-            document._read_defaults(element, "main", {})
-        return document
+            settings._read_defaults(element, "main", {})
+        return settings
 
     def _read_defaults(
         self, element: XmlElement, name: str, inherited: dict[str, dict[str, str]]
@@ -74,6 +68,35 @@ class Document:
         for child in element.all("default"):
             self._read_defaults(child, child.require("class"), own)
 
+
+@attrs.define(eq=False)
+class Document:
+    """A file with its included and attached files, and their settings.
+
+    Attributes:
+        root: the root.
+        settings: scope of elements -> the settings of their file; "" is this file.
+    """
+
+    source: Source
+    root: XmlElement
+    settings: dict[str, Settings]
+
+    @classmethod
+    def of(cls, source: Source, root: XmlElement, folder: Path) -> "Document":
+        """The document of the root of a file in a folder.
+
+        Raises:
+            FormatError: it cannot be read.
+        """
+        if root.name not in ("mujoco", "mujocoinclude"):
+            raise FormatError(f"an MJCF file is a <mujoco>, not a <{root.name}>", root.place)
+        _include(source, root, folder)
+        for asset in (one for holder in root.all("asset") for one in holder):
+            if "file" in asset.attributes and asset.name in ("mesh", "hfield"):
+                asset.attributes.setdefault("name", Path(asset.attributes["file"]).stem)
+        return cls(source, root, {"": Settings.of(root, folder)})
+
     def settled(self, element: XmlElement, childclass: str) -> XmlElement:
         """An element with the attributes of its class.
 
@@ -84,41 +107,38 @@ class Document:
         Raises:
             FormatError: there is no such class.
         """
-        name = element.get("class") or childclass
-        if name not in self.defaults:
-            known = ", ".join(self.defaults)
+        name, defaults = element.get("class") or childclass, self.settings[element.scope].defaults
+        if name not in defaults:
+            known = ", ".join(defaults)
             raise FormatError(f"there is no default class {name!r}; classes: {known}",
                               element.place)  # fmt: skip
-        values = self.defaults[name].get(_kind(element.name), {})
+        values = defaults[name].get(_kind(element.name), {})
         return attrs.evolve(element, attributes=_under(values, element.attributes))
 
     def settled_equality(self, element: XmlElement) -> XmlElement:
         """An equality with the attributes of its class, which all equalities share."""
         name = element.get("class") or "main"
-        values = self.defaults.get(name, {}).get("equality", {})
+        values = self.settings[element.scope].defaults.get(name, {}).get("equality", {})
         return attrs.evolve(element, attributes=values | element.attributes)
 
-    def flag(self, key: str, default: bool) -> bool:
-        """A setting of the compiler that is true or false."""
-        return self.compiler.get(key, "true" if default else "false") == "true"
+    def compiler(self, element: XmlElement) -> XmlElement:
+        """The settings of the compiler that an element is read by."""
+        return self.settings[element.scope].compiler
 
-    def setting(self, key: str, default: float) -> float:
-        """A setting of the compiler that is a number.
+    def angle(self, value: float, element: XmlElement) -> float:
+        """An angle of an element in rad, as its compiler reads it."""
+        radian = self.compiler(element).get("angle", "degree") == "radian"
+        return value if radian else value * pi / 180.0
 
-        Raises:
-            FormatError: it is none.
-        """
-        return self.settings.number(key, default)
-
-    @property
-    def settings(self) -> XmlElement:
-        """The compiler's settings as one element, at the place of the last."""
-        place = next((e.place for e in reversed(self.root.all("compiler"))), self.root.place)
-        return XmlElement("compiler", self.compiler, place)
-
-    def angle(self, value: float) -> float:
-        """An angle in rad, as the compiler reads it."""
-        return value if self.compiler.get("angle", "degree") == "radian" else value * pi / 180.0
+    def locate(self, asset: XmlElement, *, required: bool = False) -> Path | None:
+        """The path of the file of an asset; None, with a remark, where there is none."""
+        settings, name = self.settings[asset.scope], asset.require("file")
+        if settings.compiler.get("strippath") == "true":
+            name = Path(name.replace("\\", "/")).name
+        below = settings.compiler.get("meshdir") or settings.compiler.get("assetdir") or ""
+        if below and not name.startswith("/"):
+            name = f"{below}/{name}"
+        return self.source.locate(name, asset.place, settings.folder, required=required)
 
     def disables(self, *names: str) -> bool:
         """True if a flag of one of these names is off."""
@@ -128,8 +148,9 @@ class Document:
     def bounds(self, element: XmlElement, key: str, limited: str) -> tuple[float, float]:
         """Two bounds, infinite where they do not hold: attributes such as range and limited."""
         holds = element.get(limited, "auto")
-        given = key in element.attributes and self.flag("autolimits", True)
-        if holds == "true" or (holds == "auto" and given):
+        if holds == "auto" and key in element.attributes:
+            holds = self.compiler(element).get("autolimits", "true")
+        if holds == "true":
             low, high = element.numbers(key, 2, unbounded=True)
             return low, high
         return UNBOUNDED
@@ -152,10 +173,10 @@ class Document:
                 raise FormatError(str(error), element.place) from None
         if "axisangle" in given:
             x, y, z, angle = element.numbers("axisangle", 4)
-            return axis_angle(unit((x, y, z), element), self.angle(angle))
+            return axis_angle(unit((x, y, z), element), self.angle(angle, element))
         if "euler" in given:
-            angles = [self.angle(a) for a in element.numbers("euler", 3)]
-            sequence = self.compiler.get("eulerseq", "xyz")
+            angles = [self.angle(a, element) for a in element.numbers("euler", 3)]
+            sequence = self.compiler(element).attributes.get("eulerseq", "xyz")
             if len(sequence) != 3 or set(sequence) - set("xyzXYZ"):
                 what = f"eulerseq = {sequence!r} should be three of x, y, z, X, Y, Z"
                 raise FormatError(what, element.place)
@@ -177,18 +198,18 @@ def _under(values: dict[str, str], own: dict[str, str]) -> dict[str, str]:
     return {key: text for key, text in values.items() if replaced.get(key) not in own} | own
 
 
-def _include(source: Source, element: XmlElement) -> None:
+def _include(source: Source, element: XmlElement, folder: Path) -> None:
     """Put what included files hold in their places, all over a tree."""
     children: list[XmlElement] = []
     for child in element:
         if child.name != "include":
-            _include(source, child)
+            _include(source, child, folder)
             children.append(child)
             continue
         name = child.require("file")
-        root = source.include(name, child.place)
-        with source.including(name):
-            _include(source, root)
+        root = source.include(name, child.place, folder)
+        with source.including(name, folder):
+            _include(source, root, folder)
         children += root.children
     element.children = children
 

@@ -88,7 +88,7 @@ MJCF: Table = {
     "hfield": taken() | taken("name file nrow ncol size elevation")
     | noted("content_type", _DRAWING),
     "skin": noted("", "skins are not drawn"),
-    "model": noted("", "models that <attach> would take"),
+    "model": taken() | taken("name file") | noted("content_type", "it is MJCF"),
     "worldbody": taken(),
     "body": taken() | _FRAME | taken("name childclass")
     | translated("mocap", "a part of ground, at its pose or that of the keyframe")
@@ -124,7 +124,7 @@ MJCF: Table = {
     "composite": refused("", "composites are not expanded; save the compiled model in MuJoCo"),
     "flexcomp": refused("", "deformable bodies"),
     "replicate": taken() | taken("count sep offset euler"),
-    "attach": refused("", "models are not attached; save the compiled model in MuJoCo"),
+    "attach": taken() | taken("model body frame prefix"),
     "deformable": moves("", "deformable bodies"),
     "contact": moves("", _CONTACT),
     "pair": moves("", _CONTACT),

@@ -1,6 +1,5 @@
 """Geoms of MJCF: shapes, and the mass that they give to bodies."""
 
-from pathlib import Path
 from typing import Any
 
 import attrs
@@ -17,7 +16,6 @@ from dap3d_core.interface.formats import (
     inertia_moved,
     inertia_of_mesh,
     inertia_of_solid,
-    total_inertia,
 )
 from dap3d_formats.axes import along
 from dap3d_formats.element_table import NO_CONTACTS
@@ -29,6 +27,8 @@ FRICTION = (1.0, 0.005, 0.0001)
 FLAT = ("plane", "hfield", "sdf")
 #: Density of geoms, kg/m^3.
 WATER = 1000.0
+#: Angle by which a quarter turn may be off, rad: meshes in files have fewer digits.
+SKEW = 1e-7
 #: Group from which geoms are hidden at first, as those of contacts are.
 HIDDEN = 3
 
@@ -58,10 +58,8 @@ class Geoms:
         geoms = cls(document, paired={p.get(k) or "" for p in pairs for k in ("geom1", "geom2")})
         for asset in document.root.all("asset"):
             for mesh in asset.all("mesh"):
-                name = mesh.get("name") or Path(mesh.get("file") or "").stem
-                geoms.assets[name] = document.settled(mesh, "main")
-            for field in asset.all("hfield"):
-                geoms.fields[field.get("name") or Path(field.get("file") or "").stem] = field
+                geoms.assets[mesh.get("name") or ""] = document.settled(mesh, "main")
+            geoms.fields |= {one.get("name") or "": one for one in asset.all("hfield")}
             for material in asset.all("material"):
                 settled = document.settled(material, "main")
                 if "rgba" in settled.attributes:
@@ -117,17 +115,20 @@ class Geoms:
             text = f"meshes without a file are not drawn{', and meet no others' if meets else ''}"
             self.document.source.remarks.leave_out(geom.place, text, motion=meets)
             return None
-        path = self.document.source.locate(self._file(asset), asset.place)
+        path = self.document.locate(asset)
         if path is None:
             return None
         inner, scale = _reference(asset).inverse(), asset.numbers("scale", 3, (1.0, 1.0, 1.0))
-        if len(set(scale)) > 1 and not np.array_equal(inner.A, np.eye(3)):
+        inner = Frame(np.array(scale) * inner.r, inner.A)
+        along_axes = np.abs(inner.A).argmax(axis=0)
+        skew = np.abs(np.abs(inner.A) - np.eye(3)[:, along_axes]).max()
+        if len(set(scale)) > 1 and skew > SKEW:
             meets = common["contact"] is not None
-            text = "refquat of <mesh> with a scale of unlike factors: not drawn"
-            text += " and meets no others" if meets else ""
+            text = "refquat of <mesh> that is no quarter turn, with a scale of unlike factors: "
+            text += f"not drawn{', and meets no others' if meets else ''}"
             self.document.source.remarks.leave_out(geom.place, text, motion=meets)
             return None
-        inner = Frame(np.array(scale) * inner.r, inner.A)
+        scale = tuple(scale[k] for k in along_axes)  # it is scaled before it is turned
         pose = frame @ self.document.frame(geom) @ inner
         return Geometry("mesh", mesh=path, scale=scale, pose=pose, **common)
 
@@ -142,7 +143,7 @@ class Geoms:
         if field is None:
             raise FormatError(f"there is no hfield {name!r} in <asset>", geom.place)
         if "file" in field.attributes:
-            path = self.document.source.locate(self._file(field), field.place)
+            path = self.document.locate(field)
             if path is None:
                 return None
             heights = self.document.source.image(path, field.place)
@@ -227,13 +228,6 @@ class Geoms:
             raise FormatError(f"there is no mesh {name!r} in <asset>", geom.place)
         return self.assets[name]
 
-    def _file(self, asset: XmlElement) -> str:
-        compiler, name = self.document.compiler, asset.require("file")
-        if compiler.get("strippath") == "true":
-            name = Path(name.replace("\\", "/")).name
-        folder = compiler.get("meshdir") or compiler.get("assetdir") or ""
-        return f"{folder}/{name}" if folder and not name.startswith("/") else name
-
     def _mesh_inertia(self, geom: XmlElement) -> tuple[float, Any, Any]:
         """Volume, mass centre, and inertia about it for a mass of 1, of a mesh asset.
 
@@ -255,10 +249,9 @@ class Geoms:
             raise FormatError(f"mesh {geom.get('mesh')}: {error}", geom.place) from None
 
     def _read(self, asset: XmlElement) -> tuple[Any, Any]:
-        source = self.document.source
-        path = source.locate(self._file(asset), asset.place, required=True)
+        path = self.document.locate(asset, required=True)
         assert path is not None
-        return source.mesh(path, asset.place)
+        return self.document.source.mesh(path, asset.place)
 
 
 def _inline(asset: XmlElement) -> tuple[Any, Any]:
@@ -306,11 +299,6 @@ def _reference(asset: XmlElement) -> Frame:
     """The frame of a mesh in its file, before it is scaled."""
     q = asset.numbers("refquat", 4, (1.0, 0.0, 0.0, 0.0))
     return Frame(asset.numbers("refpos", 3, (0.0, 0.0, 0.0)), from_quaternion(q))
-
-
-def total(parts: list[Inertial]) -> Inertial | None:
-    """Parts together, or None for none."""
-    return total_inertia(parts) if parts else None
 
 
 def hexadecimal(rgba: tuple[float, ...]) -> str:

@@ -11,25 +11,18 @@ class MjcfImporter(Importer):
 
     def read(self, source: Source) -> Articulation:
         """The model in a file."""
-        from dap3d_formats.element_table import note_elements
         from dap3d_formats.mjcf.actuators import read_actuators
         from dap3d_formats.mjcf.constraints import read_equalities
         from dap3d_formats.mjcf.contacts import read_contacts
-        from dap3d_formats.mjcf.document import Document
-        from dap3d_formats.mjcf.elements import CONTACTS, MJCF
+        from dap3d_formats.mjcf.copies import read_document
         from dap3d_formats.mjcf.keyframes import Keyframe
         from dap3d_formats.mjcf.reader import MjcfReader
-        from dap3d_formats.mjcf.replicate import expand_replicas
         from dap3d_formats.mjcf.tendons import read_tendons
 
-        document = Document.of(source)
-        table = CONTACTS if source.contacts else MJCF
-        note_elements(document.root, table, source.remarks)
-        expand_replicas(document)
-        reader = MjcfReader(document)
+        reader = MjcfReader(read_document(source))
         reader.read_bodies()
         read_contacts(reader)
-        keyframe = Keyframe.of(document, reader.model)
+        keyframe = Keyframe.of(reader)
         reader.scale_masses()
         reader.add_armatures()
         inertia = reader.inertia()
@@ -37,5 +30,5 @@ class MjcfImporter(Importer):
         read_tendons(reader)
         read_equalities(reader)
         read_actuators(reader, inertia, keyframe)
-        keyframe.start(reader.model, reader.mocap)
+        keyframe.start()
         return reader.model

@@ -1,15 +1,17 @@
-"""Keyframes of MJCF: where joints, mocap bodies, activations and controls of a model start."""
+"""Keyframes of MJCF: where joints, mocap bodies, activations and controls of a model start.
+
+One of an attached model is of what was attached with it; the rest starts where the file draws it.
+One of a file that attaches others may end before the numbers of these.
+"""
+
+from itertools import accumulate
+from typing import Any
 
 import attrs
 
-from dap3d_core.interface.formats import (
-    Articulation,
-    FormatError,
-    Frame,
-    XmlElement,
-    from_quaternion,
-)
+from dap3d_core.interface.formats import FormatError, Frame, XmlElement, from_quaternion
 from dap3d_formats.mjcf.document import ACTUATORS, Document
+from dap3d_formats.mjcf.reader import MjcfReader
 
 #: Kind of a joint -> its coordinates and its rates.
 SIZES = {"free": (7, 6), "ball": (4, 3), "universal": (2, 2), "cylindrical": (2, 2)}
@@ -20,31 +22,35 @@ class Keyframe:
     """A keyframe of a document.
 
     Attributes:
+        reader: of the bodies, which have been read.
         element: the keyframe; None for none.
         kinds: joint -> its kind, in the order of the file, before equalities fix some.
     """
 
+    reader: MjcfReader
     element: XmlElement | None
     kinds: dict[str, str]
 
     @classmethod
-    def of(cls, document: Document, model: Articulation) -> "Keyframe":
+    def of(cls, reader: MjcfReader) -> "Keyframe":
         """The keyframe that the user names; the first of those without a name is 0, and so on.
 
         Raises:
             FormatError: there is none of that name.
         """
-        kinds = {name: joint.kind for name, joint in model.joints.items() if joint.kind != "fixed"}
+        document, joints = reader.document, reader.model.joints
+        kinds = {name: joint.kind for name, joint in joints.items() if joint.kind != "fixed"}
         wanted, document.source.key = document.source.key, None
         keys = [key for holder in document.root.all("keyframe") for key in holder.all("key")]
         named = {key.get("name") or str(k): key for k, key in enumerate(keys)}
         if wanted is not None and wanted not in named:
             known = f"it has {', '.join(named)}" if named else "it has none"
             raise FormatError(f"there is no keyframe {wanted!r}", document.root.place, known)
-        return cls(None if wanted is None else named[wanted], kinds)
+        return cls(reader, None if wanted is None else named[wanted], kinds)
 
-    def start(self, model: Articulation, mocap: list[str]) -> None:
+    def start(self) -> None:
         """Set where joints, and bodies that the user would move, start."""
+        model = self.reader.model
         positions, rates = self._numbers("qpos", 0), self._numbers("qvel", 1)
         for name, kind in self.kinds.items():
             joint = model.joints[name]
@@ -56,35 +62,50 @@ class Keyframe:
                 joint.position = (q[0] - joint.reference,) if scalar else q
             if name in rates:
                 joint.rate = rates[name][::-1] if kind == "cylindrical" else rates[name]
-        places, turns = self._all("mpos", 3 * len(mocap)), self._all("mquat", 4 * len(mocap))
-        for k, name in enumerate(mocap):
+        mocap = {name: (3, 4) for name, scope in self.reader.mocap.items() if self._has(scope)}
+        places, turns = (self._split(key, {name: sizes[k] for name, sizes in mocap.items()})
+                         for k, key in enumerate(("mpos", "mquat")))  # fmt: skip
+        for name in mocap:
             joint = next(one for one in model.joints.values() if one.child == name)
-            r = places[3 * k : 3 * k + 3] or joint.in_parent.r
-            A = from_quaternion(turns[4 * k : 4 * k + 4]) if turns else joint.in_parent.A
-            joint.in_parent = Frame(r, A)
+            A = from_quaternion(turns[name]) if name in turns else joint.in_parent.A
+            joint.in_parent = Frame(places.get(name, joint.in_parent.r), A)
 
     def controls(self, elements: list[XmlElement], states: list[bool]) -> list[tuple[float, float]]:
         """Activation and control of actuators at the start, of those with a state the former."""
-        controls = self._all("ctrl", len(elements)) or (0.0,) * len(elements)
-        left = iter(self._all("act", sum(states)) or (0.0,) * sum(states))
-        return [(next(left) if state else 0.0, u)
-                for state, u in zip(states, controls, strict=True)]  # fmt: skip
+        mine = {k: 1 for k, element in enumerate(elements) if self._has(element.scope)}
+        controls = self._split("ctrl", mine)
+        activations = self._split("act", {k: 1 for k in mine if states[k]})
+        return [(activations.get(k, (0.0,))[0], controls.get(k, (0.0,))[0])
+                for k in range(len(elements))]  # fmt: skip
 
     def _numbers(self, key: str, which: int) -> dict[str, tuple[float, ...]]:
         """The numbers of each joint."""
-        sizes = {name: SIZES.get(kind, (1, 1))[which] for name, kind in self.kinds.items()}
-        numbers, found, at = self._all(key, sum(sizes.values())), {}, 0
-        for name, size in sizes.items():
-            if numbers:
-                found[name] = numbers[at : at + size]
-            at += size
-        return found
+        sizes = {name: SIZES.get(kind, (1, 1))[which] for name, kind in self.kinds.items()
+                 if self._has(self.reader.joints[name])}  # fmt: skip
+        return self._split(key, sizes)
 
-    def _all(self, key: str, count: int) -> tuple[float, ...]:
-        """All numbers of an attribute, or none where it is not there."""
+    def _has(self, scope: str) -> bool:
+        """True for what the keyframe has numbers of."""
+        return self.element is not None and scope.startswith(self.element.scope)
+
+    def _split(self, key: str, sizes: dict[Any, int]) -> dict[Any, tuple[float, ...]]:
+        """The numbers of an attribute by what they belong to, none where it is not there.
+
+        Raises:
+            FormatError: there are more, or fewer where no model is attached.
+        """
         if self.element is None or key not in self.element.attributes:
-            return ()
-        return self.element.numbers(key, count)
+            return {}
+        numbers, scope = self.element.numbers(key), self.element.scope
+        ends = list(accumulate(sizes.values()))
+        attaches = any(s != scope and self._has(s) for s in self.reader.document.settings)
+        if not (attaches and len(numbers) in ends):
+            numbers = self.element.numbers(key, sum(sizes.values()))
+        return {
+            name: numbers[end - size : end]
+            for (name, size), end in zip(sizes.items(), ends, strict=True)
+            if end <= len(numbers)
+        }
 
 
 def actuators_of(document: Document) -> list[XmlElement]:

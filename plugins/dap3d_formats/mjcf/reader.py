@@ -1,7 +1,7 @@
 """Reads bodies, joints and geoms of MJCF."""
 
 from collections.abc import Iterator
-from math import inf
+from math import inf, pi
 from typing import Any
 
 import attrs
@@ -32,6 +32,9 @@ from dap3d_formats.mjcf.geoms import Geoms
 #: Type -> kind of a joint.
 KINDS = {"hinge": "revolute", "slide": "prismatic", "ball": "ball", "free": "free"}
 
+#: Kinds with one coordinate.
+SCALAR = ("revolute", "prismatic")
+
 
 @attrs.define(eq=False)
 class MjcfReader:
@@ -43,10 +46,10 @@ class MjcfReader:
         geoms: reader of geoms.
         sites: name of a site -> its link and frame.
         given: names of bodies and joints in the file, which those without a name do not take.
-        joints: names of the joints that have been read.
+        joints: joints that have been read -> scope of their elements.
         springdampers: joint -> time constant and damping ratio that give its spring and damper.
         force_ranges: joint -> bounds of the force of its actuators.
-        mocap: names of bodies that a user would move.
+        mocap: bodies that a user would move -> scope of their elements.
         ground: the link of the geoms of the world.
     """
 
@@ -55,10 +58,10 @@ class MjcfReader:
     geoms: Geoms = attrs.field(init=False)
     sites: dict[str, tuple[str, Frame]] = attrs.Factory(dict)
     given: set[str] = attrs.Factory(set)
-    joints: set[str] = attrs.Factory(set)
+    joints: dict[str, str] = attrs.Factory(dict)
     springdampers: dict[str, tuple[float, ...]] = attrs.Factory(dict)
     force_ranges: dict[str, tuple[float, float]] = attrs.Factory(dict)
-    mocap: list[str] = attrs.Factory(list)
+    mocap: dict[str, str] = attrs.Factory(dict)
     ground: str = ""
 
     def __attrs_post_init__(self) -> None:
@@ -150,7 +153,7 @@ class MjcfReader:
             raise FormatError(f"there are two bodies {name}", element.place)
         childclass = element.get("childclass") or outer
         if element.get("mocap") == "true":
-            self.mocap.append(name)
+            self.mocap[name] = element.scope
         link = Link(name, place=element.place, gravcomp=element.number("gravcomp", 0.0))
         here = frame @ document.frame(element)
         joints = self._gathered(element, ("joint", "freejoint"), Frame(), childclass)
@@ -179,18 +182,18 @@ class MjcfReader:
 
     def _inertial(self, body: XmlElement, geoms: list[tuple[XmlElement, Frame]]) -> Inertial | None:
         """Mass and inertia of a body: given, or of its geoms."""
-        document, rule = self.document, self.document.compiler.get("inertiafromgeom", "auto")
-        element = body.first("inertial")
+        compiler, element = self.document.compiler(body), body.first("inertial")
+        rule = compiler.get("inertiafromgeom", "auto")
         if element is not None and rule != "true":
             inertial: Inertial | None = self._given(element)
         elif rule == "false":
             inertial = None
         else:
-            low, high = document.settings.numbers("inertiagrouprange", 2, (0.0, 5.0))
+            low, high = compiler.numbers("inertiagrouprange", 2, (0.0, 5.0))
             counted = [(g, f) for g, f in geoms if low <= g.number("group", 0.0) <= high]
             parts = [part for g, f in counted if (part := self.geoms.inertial(g, f)) is not None]
             inertial = total_inertia(parts) if parts else None
-        return self._bounded(inertial)
+        return _bounded(inertial, compiler)
 
     def _given(self, element: XmlElement) -> Inertial:
         frame = self.document.frame(element)
@@ -200,22 +203,6 @@ class MjcfReader:
         else:
             J = np.diag(element.numbers("diaginertia", 3, (0.0, 0.0, 0.0)))
         return Inertial(element.number("mass"), frame.r, frame.A @ J @ frame.A.T)
-
-    def _bounded(self, inertial: Inertial | None) -> Inertial | None:
-        """The inertial, not below the least that the compiler allows; balanced where it says so."""
-        mass = self.document.setting("boundmass", 0.0)
-        moment = self.document.setting("boundinertia", 0.0)
-        if inertial is None and not (mass and moment):
-            return None
-        inertial = inertial or Inertial(0.0)
-        moments, axes = np.linalg.eigh(inertial.inertia)
-        J = inertial.inertia
-        if moment > moments[0]:
-            moments = np.maximum(moments, moment)
-            J = axes @ np.diag(moments) @ axes.T
-        if self.document.flag("balanceinertia", False):
-            J = balanced_inertia(J)
-        return Inertial(max(inertial.mass, mass), inertial.com, J)
 
     def _join(
         self, body: XmlElement, link: Link, parent: str, here: Frame,
@@ -271,7 +258,7 @@ class MjcfReader:
         name = element.get("name") or self._free(f"joint{len(self.model.joints) + 1}")
         if name in self.joints:
             raise FormatError(f"there are two joints {name}", element.place)
-        self.joints.add(name)
+        self.joints[name] = element.scope
         anchor = Frame(element.numbers("pos", 3, (0.0, 0.0, 0.0)))
         joint = Joint(name, KINDS[type_], "", "", in_child=frame @ anchor, place=element.place)
         if element.name == "freejoint":  # it takes nothing from default classes
@@ -285,7 +272,7 @@ class MjcfReader:
         """Limits, damping, friction, springs and armature of a joint."""
 
         def turned(value: float) -> float:
-            return self.document.angle(value) if joint.kind == "revolute" else value
+            return self.document.angle(value, element) if joint.kind == "revolute" else value
 
         joint.reference = reference = turned(element.number("ref", 0.0))
         for key, attribute in (("damping", "damping"), ("stiffness", "stiffness"),
@@ -311,7 +298,8 @@ class MjcfReader:
         if (low, high) != UNBOUNDED and not self.document.disables("limit", "constraint"):
             limited = element.get("limited", "auto")
             if joint.kind == "ball":
-                joint.limits = (Limits(upper=self.document.angle(high)),)
+                greatest = self.document.angle(max(low, high), element)
+                joint.limits = (Limits(0.0, greatest) if greatest < pi else Limits(),)
             elif low != high or limited == "true":  # of equal ones MuJoCo makes no limit
                 joint.limits = (Limits.between(turned(low) - reference, turned(high) - reference,
                                                joint.name, element.place),)  # fmt: skip
@@ -352,7 +340,7 @@ class MjcfReader:
 
     def scale_masses(self) -> None:
         """Scale all masses to the total that the compiler says."""
-        wanted = self.document.setting("settotalmass", -1.0)
+        wanted = self.document.compiler(self.document.root).number("settotalmass", -1.0)
         inertials = [link.inertial for link in self.model.links.values() if link.inertial]
         found = sum(one.mass for one in inertials)
         if wanted > 0.0 and found > 0.0:
@@ -368,6 +356,22 @@ def _names(root: XmlElement) -> Iterator[str]:
         if child.name in ("body", "joint", "freejoint") and "name" in child.attributes:
             yield child.attributes["name"]
         yield from _names(child)
+
+
+def _bounded(inertial: Inertial | None, compiler: XmlElement) -> Inertial | None:
+    """The inertial, not below the least that the compiler allows; balanced where it says so."""
+    mass, moment = compiler.number("boundmass", 0.0), compiler.number("boundinertia", 0.0)
+    if inertial is None and not (mass and moment):
+        return None
+    inertial = inertial or Inertial(0.0)
+    moments, axes = np.linalg.eigh(inertial.inertia)
+    J = inertial.inertia
+    if moment > moments[0]:
+        moments = np.maximum(moments, moment)
+        J = axes @ np.diag(moments) @ axes.T
+    if compiler.get("balanceinertia") == "true":
+        J = balanced_inertia(J)
+    return Inertial(max(inertial.mass, mass), inertial.com, J)
 
 
 def _compound(joints: list[Joint]) -> list[Joint]:

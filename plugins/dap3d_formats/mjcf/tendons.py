@@ -1,5 +1,6 @@
 """Tendons of MJCF: lines over sites, spheres and cylinders, with pulleys; sums of coordinates."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import attrs
@@ -11,6 +12,7 @@ from dap3d_core.interface.formats import (
     Drum,
     FormatError,
     Frame,
+    Joint,
     Limits,
     Tendon,
     XmlElement,
@@ -18,10 +20,10 @@ from dap3d_core.interface.formats import (
     held,
     length_of_line,
 )
-from dap3d_formats.mjcf.reader import MjcfReader
+from dap3d_formats.mjcf.reader import SCALAR, MjcfReader
 
-#: Joints with one coordinate.
-SCALAR = ("revolute", "prismatic")
+#: Changes of joints by which slopes are found, rad and m; parts of the range that end a search.
+CHANGE, DONE = 1e-6, 1e-12
 
 
 def tendon_of(reader: MjcfReader, element: XmlElement, key: str) -> XmlElement:
@@ -131,19 +133,107 @@ def _drawn(reader: MjcfReader, line: Tendon) -> float:
     if line.terms:
         joints = [(reader.model.joints[name], factor) for name, factor in line.terms]
         return sum(factor * (joint.rest[0] + joint.reference) for joint, factor in joints)
-    return length_of_line(line, lambda link: pose_of(reader, link, at_rest=True))
+    scalar = (joint for joint in reader.model.joints.values() if joint.kind in SCALAR)
+    at_rest = {joint.name: joint.rest[0] for joint in scalar}
+    return length_of_line(line, lambda link: pose_of(reader, link, at_rest))
 
 
-def pose_of(reader: MjcfReader, link: str, *, at_rest: bool = False) -> Frame:
-    """The pose of a link where the file draws it, or with the springs of joints at rest."""
-    pose = Frame()
-    while link != WORLD:
+def pose_of(
+    reader: MjcfReader, link: str, q: Mapping[str, float] | None = None,
+    poses: dict[str, Frame] | None = None,
+) -> Frame:  # fmt: skip
+    """The pose of a link.
+
+    Args:
+        reader: of the bodies.
+        link: its name.
+        q: coordinates of joints; the others are where the file draws them.
+        poses: those that have been found at these coordinates.
+    """
+    chain, q, poses = [], q or {}, {} if poses is None else poses
+    while link != WORLD and link not in poses:
         joint = next(j for j in reader.model.joints.values() if j.child == link and not j.closes)
-        if at_rest and joint.kind in SCALAR:
-            joint = held(joint, joint.rest[0])
+        chain.append(held(joint, q[joint.name]) if joint.name in q else joint)
+        link = joint.parent
+    pose = poses.get(link, Frame())
+    for joint in reversed(chain):
         step = joint.in_parent @ joint.in_child.inverse()
         if joint.kind == "free":
-            q = joint.position
-            step = Frame(q[:3], from_quaternion(q[3:]))
-        pose, link = step @ pose, joint.parent
+            step = Frame(joint.position[:3], from_quaternion(joint.position[3:]))
+        pose = poses[joint.child] = pose @ step
     return pose
+
+
+def length_range(reader: MjcfReader, line: Tendon) -> tuple[float, float]:
+    """The least and greatest length, m; both 0 where neither joints nor the tendon have limits.
+
+    MuJoCo's compiler finds them by simulation: it pulls and pushes along the tendon from where the
+    file draws the model, to 5 % of the range (tolrange). Here they are the nearest minimum and
+    maximum, or the limits of the tendon, where these lie between.
+    """
+    joints = reader.model.joints
+    if line.terms:
+        ends = np.zeros(2)
+        for name, factor in line.terms:
+            limits, reference = joints[name].limits[0], joints[name].reference
+            q = np.array([limits.lower, limits.upper]) + reference
+            ends += np.sort(factor * q) if factor else 0.0
+        return (float(ends[0]), float(ends[1])) if np.isfinite(ends).all() else (0.0, 0.0)
+    from scipy.optimize import minimize  # few files need it
+
+    movers = _movers(reader, line)
+    leads = {one.joint: one for one in reader.model.couplings if one.joint in movers}
+    free = {joint.name: joint for joint in movers.values() if joint.name not in leads}
+    for one in leads.values():
+        free[one.other] = joints[one.other]
+    bounds = [(joint.limits[0].lower, joint.limits[0].upper) for joint in free.values()]
+    scalar = all(joint.kind in SCALAR for joint in free.values())
+    own = next((one.limits for one in reader.model.tendons if one.name == line.name), Limits())
+    bounded = np.isfinite(bounds).all() or np.isfinite([own.lower, own.upper]).all()
+    if not free or not scalar or not bounded:
+        return 0.0, 0.0
+
+    def length(x: np.ndarray, sign: float) -> float:
+        q = dict(zip(free, x.tolist(), strict=True))
+        for one in leads.values():
+            q[one.joint] = one.at(q.get(one.other, 0.0))
+        poses: dict[str, Frame] = {}
+        return sign * length_of_line(line, lambda link: pose_of(reader, link, q, poses))
+
+    start = np.clip(np.zeros(len(free)), *np.array(bounds).T)
+    settings = {"eps": CHANGE, "ftol": DONE}
+    low, high = (
+        sign * minimize(length, start, (sign,), "L-BFGS-B", bounds=bounds, options=settings).fun
+        for sign in (1.0, -1.0)
+    )
+    return max(float(low), own.lower), min(float(high), own.upper)
+
+
+def slopes(reader: MjcfReader, line: Tendon) -> dict[str, float] | None:
+    """By what the length grows with each joint, where the file draws it; None for balls."""
+    if line.terms:
+        return dict(line.terms)
+    movers = _movers(reader, line)
+    if any(joint.kind not in SCALAR for joint in movers.values()):
+        return None
+
+    def length(name: str, q: float) -> float:
+        poses: dict[str, Frame] = {}
+        return length_of_line(line, lambda link: pose_of(reader, link, {name: q}, poses))
+
+    return {n: (length(n, CHANGE) - length(n, -CHANGE)) / (2.0 * CHANGE) for n in movers}
+
+
+def _movers(reader: MjcfReader, line: Tendon) -> dict[str, Joint]:
+    """The joints that move a part of the tendon against another."""
+    above = {joint.child: joint for joint in reader.model.joints.values() if not joint.closes}
+    links = {link for link, _ in line.points} | {drum.link for drum in line.drums}
+    chains = []
+    for link in links:
+        chain, at = [], link
+        while at != WORLD:
+            chain.append(above[at])
+            at = above[at].parent
+        chains.append({joint.name: joint for joint in chain if joint.kind != "fixed"})
+    common = set.intersection(*map(set, chains))
+    return {name: joint for chain in chains for name, joint in chain.items() if name not in common}

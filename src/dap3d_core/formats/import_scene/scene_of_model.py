@@ -8,6 +8,12 @@ import attrs
 import numpy as np
 
 from dap3d_core.formats.import_scene.actuators import add_actuators, add_held, add_tendons
+from dap3d_core.formats.import_scene.ball_forces import (
+    NO_LIMITS,
+    STOP_TIME,
+    add_ball_forces,
+    add_drag,
+)
 from dap3d_core.formats.import_scene.joints import (
     add_couplings,
     add_joint,
@@ -37,9 +43,6 @@ from dap3d_core.scene.tables import GROUND
 DURATION, STEP = 1.0, 0.01
 #: Limits of joints: left out, springs with dampers, or rigid.
 LIMITS = ("off", "soft", "hard")
-#: Time constant of stops where the format says no stiffness: of soft ones, and of contact at rest
-#: at hard ones, s. Critically damped, what they stop stands still within some of it.
-STOP_TIME = {"soft": 2e-3, "hard": 1e-4}
 #: Rate below which dry friction fades, rad/s and m/s.
 FADING = 1e-2
 #: What may act on each coordinate of a joint -> its name in a remark.
@@ -50,8 +53,8 @@ WORDS = {
 #: Kind of a joint -> what is taken of it.
 TAKEN = {
     "revolute": tuple(WORDS), "prismatic": tuple(WORDS),
-    "universal": ("damping", "stiffness", "friction", "limits"), "ball": ("damping", "stiffness"),
-    "free": ("damping",),
+    "universal": ("damping", "stiffness", "friction", "limits"),
+    "ball": ("damping", "stiffness", "limits"), "free": ("damping",),
 }  # fmt: skip
 
 
@@ -270,7 +273,7 @@ def _add_joint_forces(builder: SceneBuilder, joint: Joint) -> None:
     if not set(given) & set(taken):
         return
     if joint.kind in ("ball", "free"):
-        (_add_ball_spring if joint.kind == "ball" else _add_drag)(builder, joint)
+        (add_ball_forces if joint.kind == "ball" else add_drag)(builder, joint)
         return
     for k in range(len(joint.axes)):
         coordinate = _JointCoordinate(builder, joint, k)
@@ -286,27 +289,6 @@ def _acts(value: float | Limits) -> bool:
     if isinstance(value, Limits):
         return value.finite
     return bool(value)
-
-
-def _add_ball_spring(builder: SceneBuilder, joint: Joint) -> None:
-    """Add a spring and damper against any turn of a ball."""
-    ends = named_ends(builder, from_ground(builder, joint))
-    k, c = joint.stiffness[0], joint.damping[0]
-    rest = quaternion(ends.on_child.A @ ends.on_parent.A.T) if k else None
-    name = builder.names.free("forces", f"{ends.name}_{'spring' if k else 'damper'}")
-    builder.scene.add_force("sph_sd", name, body_i=ends.child, body_j=ends.parent, k=k or None,
-                            c=c or None, p_c=rest)  # fmt: skip
-
-
-def _add_drag(builder: SceneBuilder, joint: Joint) -> None:
-    """Add a damper of a free link: against its velocity at its frame, and its angular velocity."""
-    body, frame = builder.attached(joint.child, Frame())
-    point, names = f"{body}.O", builder.names
-    if frame.r.any():
-        point = names.free("points", f"{body}_drag")
-        builder.scene.add_point(point, body, float_tuple(frame.r))
-    builder.scene.add_force("bushing", names.free("forces", f"{body}_drag"), P_i=f"{GROUND}.O",
-                            P_j=point, c=(joint.damping[0],) * 6)  # fmt: skip
 
 
 class _JointCoordinate:
@@ -376,8 +358,7 @@ class _JointCoordinate:
         if not limits.finite:
             return
         if builder.limits == "off":
-            text = "limits of joints are left out: limits = off"
-            builder.remarks.translate(joint.place, text, motion=True)
+            builder.remarks.translate(joint.place, NO_LIMITS, motion=True)
             return
         if self._limit(limits):
             text = "limits of a joint are rigid: its rate ends at once, without rebound"

@@ -1,9 +1,10 @@
 """Coordinates of joints where a scene starts: given, followed by coupled joints, within limits."""
 
 from collections.abc import Mapping, Sequence
-from math import inf
+from math import atan2, cos, inf, sin
 
 import attrs
+import numpy as np
 
 from dap3d_core.formats.import_scene.spanning_tree import SpanningTree
 from dap3d_core.interface.formats.articulation import Articulation, Coupling, Joint, Limits
@@ -97,6 +98,8 @@ class _Start:
             if self.limited and joint.kind == "universal" and len(joint.limits) == 2:
                 pairs = zip(joint.position, joint.limits, strict=True)
                 joint.position = tuple(self._inside(joint, q, one) for q, one in pairs)
+            if self.limited and joint.kind == "ball":
+                self._turn_inside(joint)
 
     def _take_tangents(self) -> None:
         """Take the ratios of curved couplings where the others are, within their limits."""
@@ -222,6 +225,15 @@ class _Start:
             if self.limited:
                 self._remark(self.model.joints[name], a + b * s, a + b * at)
         return at
+
+    def _turn_inside(self, joint: Joint) -> None:
+        """Turn a ball back about the axis that it is turned about, into its limit."""
+        q = np.array(joint.position) * (1.0 if joint.position[0] >= 0.0 else -1.0)
+        size = float(np.linalg.norm(q[1:]))
+        angle = 2.0 * atan2(size, q[0])
+        at = self._inside(joint, angle, joint.limits[0])
+        if at != angle:
+            joint.position = (cos(at / 2.0), *(sin(at / 2.0) / size * q[1:]).tolist())
 
     def _inside(self, joint: Joint, q: float, limits: Limits) -> float:
         """A coordinate of a joint with several, moved into its limits."""

@@ -23,13 +23,17 @@ MOST_ELEMENTS = 500_000
 
 @attrs.define(eq=False)
 class XmlElement:
-    """An element: its name, attributes, text and children, and its place in the file."""
+    """An element: its name, attributes, text and children, and its place in the file.
+
+    ``scope`` is for an importer that puts several files together: by whose settings it is read.
+    """
 
     name: str
     attributes: dict[str, str]
     place: Place
     children: list["XmlElement"] = attrs.Factory(list)
     text: str = ""
+    scope: str = ""
 
     def __iter__(self) -> Iterator["XmlElement"]:
         return iter(self.children)
