@@ -21,12 +21,10 @@ import re
 from collections.abc import Iterator
 
 from dap3d_core.kernels.compiler.derivatives.beside import BesideWriter
-from dap3d_core.kernels.compiler.derivatives.instructions import PURE
+from dap3d_core.kernels.compiler.derivatives.instructions import FILLING, PURE, layout
 from dap3d_core.kernels.compiler.derivatives.within import WithinWriter
 from dap3d_core.kernels.compiler.lanes import rewritten
 
-#: Numbers for each float that fill vectors: a value and its slopes.
-_FILLING = (2, 4, 8, 16)
 
 
 def differentiate(text: str, count: int) -> str:
@@ -39,7 +37,7 @@ def differentiate(text: str, count: int) -> str:
     Raises:
         CompileError: it calls a function without a derivative.
     """
-    if count in _FILLING:
+    if count in FILLING:
         lanes = count
         lines = list(rewritten(text, lambda external: WithinWriter(count, external)))
     else:
