@@ -25,6 +25,7 @@ from dap3d_core.kernels.compiler.derivatives.instructions import FILLING, PURE, 
 from dap3d_core.kernels.compiler.derivatives.within import WithinWriter
 from dap3d_core.kernels.compiler.lanes import rewritten
 
+_DEFINED = re.compile(r"^(define .*\))([^()]*{)$", re.MULTILINE)
 
 
 def differentiate(text: str, count: int) -> str:
@@ -49,7 +50,8 @@ def differentiate(text: str, count: int) -> str:
         takes = "double, double" if function == "pow" else "double"
         kind = "" if function.startswith("llvm.") else PURE
         lines.append(f"declare double @{function}({takes}){kind}")
-    return "\n".join([*lines, ""])
+    # only where there is a frame pointer does LLVM align vectors that it keeps on the stack
+    return _DEFINED.sub(r'\1 "frame-pointer"="all"\2', "\n".join([*lines, ""]))
 
 
 def _beside(text: str, lanes: int) -> Iterator[str]:
