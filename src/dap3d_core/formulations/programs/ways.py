@@ -44,12 +44,14 @@ def merged(evaluator: Evaluator, tracer: StraightLine, trace: Trace, state: Floa
     """
     (places, numbers), left = trace(state)
     valid, known = tracer.guard(), [tracer.guards]
-    nearer = () if others is None else _nearer(evaluator, tracer, state, left)
-    for other in (*nearer, *(others or ())):
+
+    def take(other: Floats) -> Any:
+        """Take the way of another state, too; the state that it leaves, None if it was taken."""
+        nonlocal numbers, valid
         tracer.guards = {}
-        found, _ = trace(other)
+        found, left = trace(other)
         if tracer.guards in known or len(found.numbers) != len(numbers):
-            continue
+            return None
         known.append(tracer.guards)
         is_first = Symbol(tracer, t.Value(t.BOOL, (valid,)))
         tracer.at(is_first.value, True)
@@ -57,6 +59,16 @@ def merged(evaluator: Evaluator, tracer: StraightLine, trace: Trace, state: Floa
             tracer.where(is_first, x, y) for x, y in zip(numbers, found.numbers, strict=True)
         ]
         valid = tracer.new(f"or i1 {valid}, {tracer.guard()}")
+        return left
+
+    if others is not None:
+        for near in _nearer(evaluator, tracer, state, left):
+            take(near)
+        for other in others:
+            left = take(other)
+            if left is not None:
+                for near in _nearer(evaluator, tracer, other, left):
+                    take(near)
     return Results(places, numbers), valid
 
 

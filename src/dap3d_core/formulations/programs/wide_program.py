@@ -4,6 +4,7 @@ They are programs of the scene (scene_program.py), widened (kernels/compiler/lan
 guard fails, the results of that lane are not valid, which ``bound`` says.
 """
 
+from collections.abc import Sequence
 from contextlib import nullcontext, suppress
 from functools import partial
 from typing import Any
@@ -46,7 +47,13 @@ VALID, INVALID = 0.0, 2.0
 
 @IGNORE_FLOAT_ERRORS
 def write_wide(
-    evaluator: Evaluator, k: int, time: float, state: Floats, symbol: str, varied: Varied
+    evaluator: Evaluator,
+    k: int,
+    time: float,
+    state: Floats,
+    others: Sequence[Floats],
+    symbol: str,
+    varied: Varied,
 ) -> str:
     """LLVM IR of function k of a formulation as a function of ``Rates``, for one set.
 
@@ -71,7 +78,9 @@ def write_wide(
             places += [(pointer, place) for place in range(len(numbers))]
         return Results(places, [x for numbers in found.values() for x in numbers]), rates.y
 
-    (places, numbers), guard = merged(evaluator, tracer, trace, state, () if k == PROJECT else None)
+    (places, numbers), guard = merged(
+        evaluator, tracer, trace, state, others if k == PROJECT else None
+    )
     valid: Symbol | float = VALID
     if guard != "true":
         word = tracer.new(f"select i1 {guard}, double {VALID}, double {INVALID}")
@@ -83,8 +92,31 @@ def write_wide(
     return "\n".join([*tracer.needs.values(), text])
 
 
+def _write_some(
+    evaluator: Evaluator,
+    k: int,
+    time: float,
+    state: Floats,
+    others: Sequence[Floats],
+    symbol: str,
+    varied: Varied,
+) -> str:
+    """As ``write_wide``; without the ways of the others where all were too long."""
+    try:
+        return write_wide(evaluator, k, time, state, others, symbol, varied)
+    except TraceError:
+        if k != PROJECT or not others:
+            raise
+        return write_wide(evaluator, k, time, state, (), symbol, varied)
+
+
 def program_rates(
-    evaluator: Evaluator, count: int, time: float, state: Floats, varied: Varied
+    evaluator: Evaluator,
+    count: int,
+    time: float,
+    state: Floats,
+    varied: Varied,
+    others: Sequence[Floats] = (),
 ) -> WideRates:
     """Functions of ``count`` sets: all but the right-hand side are left out where they have none.
 
@@ -93,6 +125,7 @@ def program_rates(
         count: sets of numbers.
         time, state: where branches are decided; a state as projections are given.
         varied: numbers that differ from set to set (symbolic_arrays.py).
+        others: of projections, as of ``merged`` (ways.py).
 
     Raises:
         CompileError, TraceError: the scene has none; says why.
@@ -102,7 +135,7 @@ def program_rates(
 
     functions = {}
     for k in programmed(evaluator):
-        write = partial(write_wide, evaluator, k, time, state, varied=varied)
+        write = partial(_write_some, evaluator, k, time, state, others, varied=varied)
         with nullcontext() if k == RHS else suppress(CompileError, TraceError):
             unit = wide_unit(f"{name}-{k}x{count}", count, write, optimise=False)
             functions[k] = Entry(unit, 0, SIGNATURE)

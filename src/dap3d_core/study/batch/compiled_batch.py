@@ -15,6 +15,7 @@ from dap3d_core.formulations.programs.change_over import ChangeOver
 from dap3d_core.integrators import EXPLICIT, IMPLICIT, INTEGRATORS
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.runge_kutta.step import advance
+from dap3d_core.integrators.stepping.integration import off_constraints
 from dap3d_core.integrators.stepping.integration_state import Status
 from dap3d_core.kernels.runtime.cache import jit_is_on, table_of
 from dap3d_core.kernels.runtime.function_lists import INTEGER, LOOP_LIST, procedure_signature
@@ -35,6 +36,9 @@ if TYPE_CHECKING:
 LEAST_IN_LANES, BEFORE_LANES, USUAL_CALLS = 4, 500_000, 300.0
 #: Right-hand sides after which a compiled call returns, so that Ctrl-C is answered.
 CALL = 200_000
+#: States of a run, at most, where the ways of projections are sought; right-hand sides between
+#: them, at first.
+MOST_STATES, FIRST_CALLS = 8, 50
 #: Constants of the metric in which displacements are measured in m (Model.length) and rad.
 UNIT_METRIC = np.array([1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0])
 
@@ -139,8 +143,12 @@ class CompiledBatch:
         """What ran points in lanes of vectors; in words why none; None where none was needed."""
         return None if self._lanes is None else self._lanes[1]
 
-    def _lanes_for(self) -> "LaneBatch | str":
-        """What runs many points in lanes; in words why they are run one by one."""
+    def _lanes_for(self, *point: Any) -> "LaneBatch | str":
+        """What runs many points in lanes; in words why they are run one by one.
+
+        Args:
+            point: arguments of ``points`` for one that is run to see the ways of projections.
+        """
         from dap3d_core.study.batch.lanes import LaneBatch, reason_against, wide_rates
 
         key = id(self.evaluator.system), self._varied.tobytes()
@@ -148,7 +156,8 @@ class CompiledBatch:
             found: LaneBatch | str = reason_against(self.evaluator, self._place[1].size)
             if not found:
                 varied = varied_at(self.evaluator.system, self._varied)
-                wide = wide_rates(self.evaluator, *self._place, varied)
+                states = self._states_of_run(self.points(*point))
+                wide = wide_rates(self.evaluator, *self._place, varied, states)
                 found = (
                     wide
                     if isinstance(wide, str)
@@ -156,6 +165,19 @@ class CompiledBatch:
                 )
             self._lanes = key, found
         return self._lanes[1]
+
+    def _states_of_run(self, point: driver.Points) -> list[Floats]:
+        """Some states in the course of the run of one point, as projections were given them."""
+        *arguments, _ = self.arguments(point)
+        states: list[Floats] = []
+        calls = FIRST_CALLS
+        with np.errstate(all="ignore"):  # as compiled code does
+            while point.at[driver.POINT] == 0:
+                driver.run_points(*arguments, calls)
+                states.append(self.integration.trial)
+                if len(states) > MOST_STATES:
+                    states, calls = states[1::2], 2 * calls
+        return [*states, off_constraints(self.integration.y)]
 
     @property
     def _place(self) -> tuple[float, Floats]:
@@ -248,7 +270,7 @@ class CompiledBatch:
         if start != driver.CORRECT_ONLY and self.takes_lanes and self._is_long(count):
             from dap3d_core.formulations.programs.scene_program import reads_rates
 
-            lanes = self._lanes_for()
+            lanes = self._lanes_for(table[:1], places, y0[:1], start)
             if not isinstance(lanes, str) and lanes.is_ready:
                 run(lambda: lanes.run(points, CALL), needs_programs=reads_rates(self.evaluator))
         while True:

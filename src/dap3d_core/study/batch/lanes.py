@@ -403,7 +403,11 @@ def reason_against(evaluator: Evaluator, size: int) -> str:
 
 
 def wide_rates(
-    evaluator: Evaluator, time: float, state: Floats, varied: Mapping[str, Integers]
+    evaluator: Evaluator,
+    time: float,
+    state: Floats,
+    varied: Mapping[str, Integers],
+    others: Sequence[Floats] = (),
 ) -> WideRates | str:
     """The right-hand side of all lanes; in words why there is none.
 
@@ -411,12 +415,13 @@ def wide_rates(
         evaluator: evaluates the model.
         time, state: of a run.
         varied: numbers that differ from point to point (formulations/programs/symbolic_arrays.py).
+        others: further states of a run, as projections are given them.
     """
     try:
         if evaluator.model.body_count <= MOST_BODIES_OF_PROGRAM:
             from dap3d_core.formulations.programs.wide_program import program_rates
 
-            return program_rates(evaluator, lane_count(), time, state, varied)
+            return program_rates(evaluator, lane_count(), time, state, varied, others)
         reason = f"it has more than {MOST_BODIES_OF_PROGRAM} bodies"
     except (CompileError, TraceError) as error:
         reason = str(error)

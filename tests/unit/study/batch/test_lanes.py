@@ -97,6 +97,16 @@ def test_a_lane_takes_the_next_point_when_its_run_has_ended():
     assert len(points) > 2 * lanes_of(of).count
 
 
+def test_projections_take_the_ways_of_a_run():
+    """How many passes they need at the start of the first run says little of its course."""
+    settings = {"t_end": 0.5, "dt": 0.5}
+    of, _ = check(
+        lambda: ensemble(dap.load("tri"), ("bodies.frame.mass",), ("frame.r:series",), **settings),
+        np.linspace(18.0, 22.0, 8)[:, None],
+    )
+    assert np.all(lanes_of(of)._lanes.bound < 1.0)
+
+
 def swinging(name, **settings):
     return ensemble(pendulum(), (name,), ("bob.r:series",),
                     **{"method": "joint", "t_end": 0.5, "dt": 0.25} | settings)  # fmt: skip
@@ -113,6 +123,7 @@ def test_points_that_have_a_model_each():
     assert path_of(of) == "rebuilt"
 
 
+@pytest.mark.slow
 def test_rates_whose_angles_leave_the_range_of_lanes_are_evaluated_alone(monkeypatch):
     """Beyond 2e5 rad half angles are reduced in another way: steps of 0.1 s at 1e7 rad/s."""
     scene = pendulum()
@@ -271,9 +282,10 @@ def test_lanes_made_between_points_leave_the_numbers_of_the_scene():
     evaluator = runner.compiled_batch.evaluator
     u = of.compiled.model.u0.copy()
     u[2] += 0.1
-    evaluator.coordinates.start(u)
+    y0 = evaluator.coordinates.start(u)
     before = evaluator.system.tree.constants.copy()
-    assert isinstance(runner.compiled_batch._lanes_for(), study_lanes.LaneBatch)
+    point = np.zeros((1, 0)), np.zeros(0, dtype=np.int64), y0[None]
+    assert isinstance(runner.compiled_batch._lanes_for(*point), study_lanes.LaneBatch)
     assert np.array_equal(evaluator.system.tree.constants, before)
 
 
