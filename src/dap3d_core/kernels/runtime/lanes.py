@@ -16,7 +16,8 @@ import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.compiler import objects
-from dap3d_core.kernels.compiler.derivatives import differentiate, layout
+from dap3d_core.kernels.compiler.derivatives import differentiate
+from dap3d_core.kernels.compiler.derivatives.instructions import layout
 from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.lanes import widen
 from dap3d_core.kernels.compiler.types import COMPLEX, FLOAT, Signature, Struct

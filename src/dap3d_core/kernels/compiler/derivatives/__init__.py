@@ -21,7 +21,7 @@ import re
 from collections.abc import Iterator
 
 from dap3d_core.kernels.compiler.derivatives.beside import BesideWriter
-from dap3d_core.kernels.compiler.derivatives.instructions import FILLING, PURE, layout
+from dap3d_core.kernels.compiler.derivatives.instructions import FILLING, PURE
 from dap3d_core.kernels.compiler.derivatives.within import WithinWriter
 from dap3d_core.kernels.compiler.lanes import rewritten
 

@@ -40,6 +40,7 @@ class BesideWriter(Instructions):
         """
         super().__init__(lanes, external)
         self._width, self._first = layout(lanes + 1)
+        self._align = f"align {8 * self._first}"
         self._pair = f"{{double, {self.vector}}}"
         self._has_slopes = not any(line.endswith(VALUES) for line in lines)
         #: Vectors of slopes by the names of numbers; those of others are zero.
@@ -144,7 +145,7 @@ class BesideWriter(Instructions):
             self._slots.add(name)
             self.out += [line, f"  {name}.d = alloca {self.vector}"]
         else:
-            self.out.append(DOUBLE.sub(f"[{self._width} x double]", f"{line}, align {8*self._first}"))
+            self.out.append(DOUBLE.sub(f"[{self._width} x double]", f"{line}, {self._align}"))
 
     def _place(self, at: str) -> str:
         """Where the slopes of the number at an address are."""
@@ -156,11 +157,11 @@ class BesideWriter(Instructions):
         if at in self._held:
             self._keep(name, self._slopes.get(self._held[at]))
         elif self._has_slopes:
-            self._keep(name, self.new(f"load {self.vector}, ptr {self._place(at)}, align {8*self._first}"))
+            self._keep(name, self.new(f"load {self.vector}, ptr {self._place(at)}, {self._align}"))
 
     def _store(self, word: str, at: str) -> None:
         place, slopes = self._place(at), self._zero_or(word)
-        self.out.append(f"  store {self.vector} {slopes}, ptr {place}, align {8*self._first}")
+        self.out.append(f"  store {self.vector} {slopes}, ptr {place}, {self._align}")
         if at in self._slots:
             self._held[at] = word
 
