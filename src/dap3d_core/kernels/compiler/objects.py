@@ -143,6 +143,8 @@ def compile_ir(
     has_long_block = max(block.count("\n") for block in text.split(":\n")) > LONG_BLOCK
     generation = min(level, OF_LONG_BLOCKS) if has_long_block else level
     machine = _target_machine(generation, target, is_linked=is_linked)
+    if level > UNOPTIMISED and "%slope." in text:  # LLVM finds functions of several times the size
+        text = text.replace(" inlinehint", " alwaysinline")  # too long, and passes slopes in memory
     module = llvm.parse_assembly(text)
     module.triple, module.data_layout = target.triple, str(machine.target_data)
     module.verify()

@@ -17,6 +17,7 @@ import numpy as np
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.compiler.derivatives import differentiate
+from dap3d_core.kernels.compiler.derivatives.instructions import layout
 from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.lanes import widen
 from dap3d_core.kernels.compiler.types import COMPLEX, FLOAT, Signature, Struct
@@ -190,7 +191,9 @@ class DifferentiatedArrays(WideArrays):
 
     def __init__(self, arrays: Arrays, count: int, buffers: Buffers | None = None) -> None:
         """Args: the arrays; numbers for each of theirs; those of other structs, to be shared."""
-        super().__init__(arrays, count, (), buffers)
+        width, self._first = layout(count)
+        self._lanes = slice(self._first, self._first + count - 1)
+        super().__init__(arrays, width, (), buffers)
 
     def matrix(self, array: Floats) -> Floats:
         """As of ``WideArrays``; with the numbers of the array, where it is new."""
@@ -225,7 +228,7 @@ class DifferentiatedArrays(WideArrays):
 
     def slopes(self, array: Floats) -> Floats:
         """(size, count - 1) view of the slopes of an array."""
-        return self.matrix(array)[:, 1:]
+        return self.matrix(array)[:, self._lanes]
 
 
 class Differentiation:

@@ -21,12 +21,11 @@ import re
 from collections.abc import Iterator
 
 from dap3d_core.kernels.compiler.derivatives.beside import BesideWriter
-from dap3d_core.kernels.compiler.derivatives.instructions import PURE
+from dap3d_core.kernels.compiler.derivatives.instructions import FILLING, PURE
 from dap3d_core.kernels.compiler.derivatives.within import WithinWriter
 from dap3d_core.kernels.compiler.lanes import rewritten
 
-#: Numbers for each float that fill vectors: a value and its slopes.
-_FILLING = (2, 4, 8, 16)
+_DEFINED = re.compile(r"^(define .*\))([^()]*{)$", re.MULTILINE)
 
 
 def differentiate(text: str, count: int) -> str:
@@ -39,7 +38,7 @@ def differentiate(text: str, count: int) -> str:
     Raises:
         CompileError: it calls a function without a derivative.
     """
-    if count in _FILLING:
+    if count in FILLING:
         lanes = count
         lines = list(rewritten(text, lambda external: WithinWriter(count, external)))
     else:
@@ -51,7 +50,8 @@ def differentiate(text: str, count: int) -> str:
         takes = "double, double" if function == "pow" else "double"
         kind = "" if function.startswith("llvm.") else PURE
         lines.append(f"declare double @{function}({takes}){kind}")
-    return "\n".join([*lines, ""])
+    # only where there is a frame pointer does LLVM align vectors that it keeps on the stack
+    return _DEFINED.sub(r'\1 "frame-pointer"="all"\2', "\n".join([*lines, ""]))
 
 
 def _beside(text: str, lanes: int) -> Iterator[str]:

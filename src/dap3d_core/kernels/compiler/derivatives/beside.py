@@ -6,7 +6,13 @@ Numbers that come of no array have no slopes, which are not computed then.
 
 import re
 
-from dap3d_core.kernels.compiler.derivatives.instructions import DOUBLE, ONE, RESULT, Instructions
+from dap3d_core.kernels.compiler.derivatives.instructions import (
+    DOUBLE,
+    ONE,
+    RESULT,
+    Instructions,
+    layout,
+)
 from dap3d_core.kernels.compiler.types import CompileError
 from dap3d_core.kernels.compiler.writer import COUNT, SLOPE, SLOPES, VALUES
 
@@ -33,6 +39,8 @@ class BesideWriter(Instructions):
         lines: of the function.
         """
         super().__init__(lanes, external)
+        self._width, self._first = layout(lanes + 1)
+        self._align = f"align {8 * self._first}"
         self._pair = f"{{double, {self.vector}}}"
         self._has_slopes = not any(line.endswith(VALUES) for line in lines)
         #: Vectors of slopes by the names of numbers; those of others are zero.
@@ -68,7 +76,7 @@ class BesideWriter(Instructions):
         elif "double" not in text or _PLAIN.match(text):
             self.out.append(line)
         elif text.startswith("getelementptr "):
-            self.out.append(DOUBLE.sub(f"[{self.lanes + 1} x double]", line))
+            self.out.append(DOUBLE.sub(f"[{self._width} x double]", line))
         elif not self._has_written(name, text, line):
             raise CompileError(f"differentiation does not know {text}")
         return self.out
@@ -137,23 +145,23 @@ class BesideWriter(Instructions):
             self._slots.add(name)
             self.out += [line, f"  {name}.d = alloca {self.vector}"]
         else:
-            self.out.append(DOUBLE.sub(f"[{self.lanes + 1} x double]", line))
+            self.out.append(DOUBLE.sub(f"[{self._width} x double]", f"{line}, {self._align}"))
 
     def _place(self, at: str) -> str:
         """Where the slopes of the number at an address are."""
         if at in self._slots:
             return f"{at}.d"
-        return self.new(f"getelementptr inbounds double, ptr {at}, i64 1")
+        return self.new(f"getelementptr inbounds double, ptr {at}, i64 {self._first}")
 
     def _load(self, name: str, at: str) -> None:
         if at in self._held:
             self._keep(name, self._slopes.get(self._held[at]))
         elif self._has_slopes:
-            self._keep(name, self.new(f"load {self.vector}, ptr {self._place(at)}, align 8"))
+            self._keep(name, self.new(f"load {self.vector}, ptr {self._place(at)}, {self._align}"))
 
     def _store(self, word: str, at: str) -> None:
         place, slopes = self._place(at), self._zero_or(word)
-        self.out.append(f"  store {self.vector} {slopes}, ptr {place}, align 8")
+        self.out.append(f"  store {self.vector} {slopes}, ptr {place}, {self._align}")
         if at in self._slots:
             self._held[at] = word
 

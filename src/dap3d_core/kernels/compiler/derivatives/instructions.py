@@ -14,6 +14,21 @@ PURE = " nobuiltin nounwind willreturn memory(none)"
 _FLAT = ("llvm.floor.f64", "llvm.ceil.f64", "llvm.rint.f64")
 
 
+#: Numbers for each float that fill vectors: a value and its slopes.
+FILLING = (2, 4, 8, 16)
+
+
+def layout(count: int) -> tuple[int, int]:
+    """Numbers of an item of an array, of which the first is the value; the first of its slopes.
+
+    Vectors of slopes that lie across lines of the cache take twice as long to load and to store.
+    """
+    if count in FILLING:
+        return count, 1
+    register = 4 if count > 4 else 2
+    return register * (1 - (1 - count) // register), register
+
+
 class Instructions:
     """Writes instructions of numbers and of vectors of ``lanes`` numbers."""
 
