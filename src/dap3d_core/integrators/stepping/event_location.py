@@ -72,6 +72,8 @@ MAX_STALLS = 20
 MAX_STALLS_AT_ZERO = 10
 #: A step this part of a usual one has been cut, and grows anew.
 CUT_SHORT = 1e-3
+#: A change of a switch by this part of its band is rounding.
+SAME = 1.0 / 32.0
 #: Attempts in a row that may be cut because a cubic, and no sample, shows two crossings; and the
 #: error of the cubic, as a part of its drop: of a sine 5 % in a step of 1.5 rad, 20 % in one of 3.
 MAX_SUSPICIONS, CUBIC_ERROR = 8, 0.25
@@ -271,7 +273,8 @@ def update_switches_after_step(
         work.near_switch = -1
     for k in range(s.shape[1]):
         approaches = (s[SIDE, k] * s[RATE, k] < 0.0) | may_rest(s, k)  # or its rate is noise
-        stalled |= is_short & approaches & (s[FOUND, k] == s[VALUE, k]) & (k == work.near_switch)
+        is_same = abs(s[FOUND, k] - s[VALUE, k]) <= SAME * s[BAND, k]
+        stalled |= is_short & approaches & is_same & (k == work.near_switch)
         s[BEND, k] = (s[FOUND_RATE, k] - s[RATE, k]) / h
         s[VALUE, k], s[RATE, k] = s[FOUND, k], s[FOUND_RATE, k]
         if s[SIDE, k] == 0.0:
