@@ -74,9 +74,9 @@ class PairUnit:
         self._unit = unit
         self.name, self.symbols = f"{unit.name}-d{PAIR}", unit.symbols
 
-    def write(self, symbols: list[str]) -> tuple[str, list[Any]]:
+    def fresh_text(self, symbols: list[str]) -> str:
         """As of ``Unit``."""
-        return differentiate(self._unit.fresh_text(symbols), PAIR), []
+        return differentiate(self._unit.fresh_text(symbols), PAIR)
 
 
 @attrs.frozen(eq=False)
