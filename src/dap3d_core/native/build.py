@@ -181,7 +181,7 @@ def _module_of(called: CalledUnit, file: Path) -> Module:
         text = text.replace(" nounwind", SMALL)
     for k, symbol in enumerate(symbols):
         text = _linked(text, symbol, "hidden" if k in called.kept else "internal")
-    return Module(text, QUICK if text.count("\n") > LONG else OPTIMISED, file)
+    return Module(text, min(QUICK if text.count("\n") > LONG else OPTIMISED, OPTIMISED), file)
 
 
 def _linked(text: str, symbol: str, linkage: str) -> str:
