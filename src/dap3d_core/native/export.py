@@ -14,7 +14,7 @@ from dap3d_core.formats.export_model import ExportReport
 from dap3d_core.formats.export_model import export_model as export_text
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.formats import ResultExporter
-from dap3d_core.kernels.compiler.background import optimiser
+from dap3d_core.kernels.compiler import background
 from dap3d_core.kernels.compiler.types import CompileError
 from dap3d_core.native.build import PLATFORMS, Platform, platforms_named
 from dap3d_core.native.c_source import PARAMETERS, Variable, data_of, variables_header, variables_of
@@ -310,7 +310,7 @@ def export_model(
     if path is None:
         raise refusal(f"format {kind} needs a path", "give that of the file or folder")
     given |= {"strict": strict, "force": force, "allow_code": allow_code, "registry": registry}
-    with optimiser.held():
+    with background.optimiser.held():
         return export_native(scene, path, format=kind, fmi=fmi, **given)
 
 
