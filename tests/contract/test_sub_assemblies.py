@@ -63,7 +63,7 @@ def evaluated(scene, u):
 
 
 @pytest.mark.thinned(2)
-@pytest.mark.every(5)
+@pytest.mark.every(11)
 @pytest.mark.parametrize(
     ("kind", "case"), CASES, ids=[f"{k}-{n}" for k, c in CASES for n in case_names([c])]
 )

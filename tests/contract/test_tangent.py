@@ -105,7 +105,7 @@ def close(exact, difference, tolerance):
     np.testing.assert_allclose(exact, difference, rtol=0.0, atol=limit)
 
 
-@pytest.mark.every(5)
+@pytest.mark.every(11)
 @pytest.mark.parametrize("case", JOINTS, ids=case_names(JOINTS))
 @pytest.mark.parametrize("ground", [None, "j"], ids=["body-body", "body-ground"])
 def test_joint(case, ground):
@@ -115,7 +115,7 @@ def test_joint(case, ground):
     compare(scene_for(type_info, np.random.default_rng(0), ground=ground, values=values))
 
 
-@pytest.mark.every(4)
+@pytest.mark.every(9)
 @pytest.mark.parametrize("case", FORCES, ids=case_names(FORCES))
 def test_force(case):
     """The wrenches of a force have their derivatives."""
@@ -144,7 +144,7 @@ def has_friction(keyword, values):
 WITH_FRICTION = [(keyword, values) for keyword, values in JOINTS if has_friction(keyword, values)]
 
 
-@pytest.mark.every(4)
+@pytest.mark.every(9)
 @pytest.mark.parametrize("case", WITH_FRICTION, ids=case_names(WITH_FRICTION))
 def test_friction(case):
     """Friction of a joint has its derivatives, those by the multipliers as well."""

@@ -41,7 +41,7 @@ def test_more_inputs(name):
     TARGETS[name].run(1, COUNTS[name][1])
 
 
-@pytest.mark.every(4)
+@pytest.mark.every(11)
 @pytest.mark.parametrize("number", [1_000_014, 1357, 1477, 1_642_375, 2184, 1_000_076,
                                     1_048_577, 1_159_636, 2021,
                                     1_650_876, 14_923_612, 10_445_297, 11_594_543, 18_897_519,

@@ -199,6 +199,7 @@ def test_a_jump_that_no_switch_sees_is_found(level):
     assert "wrench jumps by" in str(report)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "level"), [(lambda z, k: -k * z + 50.0, 0.0), (lambda z, k: -k * z, 0.2)]
 )

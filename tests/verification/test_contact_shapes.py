@@ -85,6 +85,7 @@ def test_a_lying_cylinder_slides_then_rolls_with_two_thirds_of_its_speed():
     assert result.ledger["energy"].value < TOLERANCE
 
 
+@pytest.mark.slow
 def test_a_disk_rolls_on_its_rim_about_a_centre_at_rest():
     """Omega^2 sin(alpha) = g / (k a), J = k m a^2 about a diameter (Moffatt, Nature 404, 2000)."""
     a, alpha, k = 0.2, 0.4, 0.25
@@ -180,6 +181,7 @@ def stack(offset=0.0, yaw=0.0, mu=0.5):
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("offset", "yaw"), [(0.0, 0.0), (0.0499, 0.0), (0.01, 0.5)])
 def test_a_box_rests_on_another_while_its_centre_is_above_it(offset, yaw):
     result = dap.simulate(stack(offset, yaw), t_end=100.0, dt=50.0, integrator="dop853")
@@ -207,6 +209,7 @@ def test_a_box_slides_on_another_that_sticks():
     assert result.ledger["energy"].value < TOLERANCE
 
 
+@pytest.mark.slow
 def test_edges_of_crossed_boxes_bounce():
     e, h, drop = 0.5, 0.1, 0.2
     scene = dap.Scene(name="crossed")

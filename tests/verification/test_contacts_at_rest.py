@@ -62,6 +62,7 @@ def test_a_ladder_rests_where_its_tangent_exceeds_half_the_inverse_of_friction()
         dap.equilibrium(ladder(limit * 0.999, mu))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mu", [0.0, 0.5])
 def test_a_ball_comes_to_rest_at_the_bottom_of_a_bowl(mu):
     big, small, angle = 1.0, 0.1, 0.3

@@ -74,6 +74,7 @@ def cam(add_curve, rate=RATE, **contact):
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backwards", [False, True])
 def test_a_roller_follows_an_eccentric(backwards):
     """Whichever way round the curve is given."""
@@ -88,6 +89,7 @@ def test_a_roller_follows_an_eccentric(backwards):
     assert np.linalg.norm(at - centre, axis=1) == pytest.approx(A, abs=TOLERANCE)
 
 
+@pytest.mark.slow
 def test_a_roller_follows_a_table():
     """Cubic splines of the circle are off by 5/384 h^4 A at most, twice that with both."""
     result = dap.simulate(cam(add_spline), t_end=2.0, **(TIGHT | {"rtol": 1e-9, "atol": 1e-11}))
@@ -158,6 +160,7 @@ def test_a_ball_leaves_a_wire():
     assert result.ledger["energy"].value < TOLERANCE
 
 
+@pytest.mark.slow
 def test_a_ball_swings_in_a_pipe():
     """Let go level in a ring of pipe it is at the bottom at K(1/2) sqrt(L/g), pressed by 3 m g.
 

@@ -26,6 +26,7 @@ def test_slide_distance_by_friction_and_speed():
     assert found.event_times[stops] == pytest.approx([-v / (mu**2 * G), 1 / (mu * G)], rel=1e-8)
 
 
+@pytest.mark.slow
 def test_flight_and_bounce_by_restitution_and_height():
     """After the first bounce z = e v1 (t - t1) - g (t - t1)^2 / 2."""
     e, h, t_end, radius = 0.7, 1.0, 1.0, 0.1

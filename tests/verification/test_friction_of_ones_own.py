@@ -94,6 +94,7 @@ def times(result, kind):
     return [e.t for e in result.events if e.kind == kind]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("class_", [Stribeck, Runner])
 def test_the_formulas_are_right(class_):
     failed = [str(outcome) for check in checks_for(class_) if not (outcome := check.run()).ok]

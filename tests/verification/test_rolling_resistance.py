@@ -194,6 +194,7 @@ def test_a_type_of_one_s_own_says_what_resists(contact, limit):
     assert result.r[-1, 0, 0] == pytest.approx(0.5 * v**2 / a, abs=limit)
 
 
+@pytest.mark.slow
 def test_check_plugin_takes_lengths_that_are_not_negative_alone():
     assert check_type(Wheel).ok
     words = "a negative length would drive"

@@ -114,6 +114,7 @@ def driven_parallelogram():
     return scene
 
 
+@pytest.mark.slow
 def test_radau_is_not_held_up_by_multipliers_that_have_yet_to_settle():
     """Behind a crossing those of redundant rows change by much, the motion hardly: with the norm of
     states alone steps were halved until ten times as many were taken as at ten times the tolerance.

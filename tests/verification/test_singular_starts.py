@@ -130,6 +130,7 @@ def test_a_slider_goes_through_its_dead_centre(rtol):
     assert found[~away] == pytest.approx(np.column_stack([cosine, sine])[~away], abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_hand_that_is_pulled_too_far_is_named():
     """At 2 m: the driver, its function, the value and the time, and who cannot follow."""
     with pytest.raises(dap.SimulationError) as caught:

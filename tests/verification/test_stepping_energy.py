@@ -64,6 +64,7 @@ def test_what_a_stack_loses_at_an_impact_is_the_work_of_its_contacts():
         assert result.ledger[name].value < 1e-13
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("e", [0.0, 0.5])
 def test_the_ledger_of_a_pile_is_balanced(e):
     """27 balls onto each other at 4 ms: energy to the residual, 1.3e-2 once; heights to h^2."""

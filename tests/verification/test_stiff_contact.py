@@ -222,6 +222,7 @@ def test_the_work_of_a_first_step_is_that_of_its_stages():
     assert result.ledger["energy"].value < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["dop853", "adams"])
 def test_a_run_that_stalls_says_why_and_keeps_what_it_has(integrator):
     """Friction that fades at 1e-13 m/s needs steps of 1e-13 s. What was computed until the block

@@ -90,6 +90,7 @@ def test_a_motion_that_comes_to_rest_again_and_again(method, integrator, dt, rev
     )
 
 
+@pytest.mark.slow
 @pytest.mark.thinned(2)
 @pytest.mark.parametrize("method", ["standard", "joint"])
 @pytest.mark.parametrize(
@@ -268,6 +269,7 @@ class EnoughError(Exception):
     pass
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["standard", "joint"])
 def test_resumed_saved_and_opened_runs_have_their_turns(method, tmp_path):
     def stop(t, t_end):

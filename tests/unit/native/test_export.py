@@ -391,6 +391,7 @@ def test_friction_masses_and_places_are_parameters_of_stepped_contacts(tmp_path)
         exported(scene, tmp_path, parameters=["bodies.ball.Jp.1.1"])
 
 
+@pytest.mark.slow
 def test_a_mass_beside_joints_is_a_parameter_of_stepped_contacts(tmp_path):
     scene, name = dap.load("quadruped"), "bodies.trunk.mass"
     made, library = exported(scene, tmp_path, outputs=["trunk.r"], parameters=[name])
@@ -439,6 +440,7 @@ def test_a_name_that_is_no_identifier(tmp_path):
     assert library.name == "lib_4_gr_en.a"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("contact", ["events", "stepping"])
 def test_a_run_where_friction_would_drive_says_so(tmp_path, contact):
     given = {"t_end": 1.0, "contact": contact, "registry": registry_of(Wheel)}
@@ -447,6 +449,7 @@ def test_a_run_where_friction_would_drive_says_so(tmp_path, contact):
         dap.load_native(made.path).start(1.0).step_to(1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.every(2)
 @pytest.mark.parametrize(("jams", "said"), [(-1, "rattle: slip jams again and again"),
                                             (99, "change ever faster")])  # fmt: skip

@@ -49,6 +49,7 @@ def test_pairs_meet_on_the_axis(found):
     np.testing.assert_allclose(near, 40.0, atol=2.0)
 
 
+@pytest.mark.slow
 def test_direction_of_the_values_does_not_matter(found):
     """From the last value to the first the same pieces are drawn, in the same colours."""
     pieces = []

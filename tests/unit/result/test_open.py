@@ -265,6 +265,7 @@ def test_parts_and_blocks_are_those_of_the_whole(both):
     assert len(dap.view(large).html) > 1000
 
 
+@pytest.mark.slow
 def test_a_file_may_be_opened_and_dropped_in_threads(tmp_path):
     """HDF5 crashed where some of several handles of one file were closed, or closed meanwhile."""
     dap.simulate(problems.pendulum(), output=tmp_path / "run.nc", **SHORT)

@@ -68,6 +68,7 @@ def snap():
     return dap.equilibrium_path(truss(), "forces.load.f.z", "50:-50:5")
 
 
+@pytest.mark.slow
 def test_truss_snaps_through(snap):
     """Loads and heights of both turning points are those of the closed form, to rounding."""
     z = turning_height()
@@ -105,6 +106,7 @@ def snap_length():
     return dap.compile(truss()).model.part_size
 
 
+@pytest.mark.slow
 def test_quantities_depend_on_the_parameter(snap):
     """Forces and reactions are those with the values of each point."""
     z = snap.of("node.r.z")
@@ -184,6 +186,7 @@ def test_column_that_is_pushed_follows_one_path():
     assert not (found.turning | found.branching).any()
 
 
+@pytest.mark.slow
 @pytest.mark.every(3)
 @pytest.mark.parametrize(
     ("parameter", "values"),

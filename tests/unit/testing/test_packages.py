@@ -69,6 +69,7 @@ def test_tests_that_are_installed_are_run(install):
     assert "no answer" in tests.output
 
 
+@pytest.mark.slow
 def test_tests_of_an_editable_install_are_those_of_its_sources(install, tmp_path):
     """In its folder ``tests``, with the settings of its folder."""
     (tmp_path / "src" / "tests").mkdir(parents=True)

@@ -2,6 +2,7 @@
 
 import json
 
+import pytest
 from click.testing import CliRunner
 from support.command_line import dap3d, output_of
 
@@ -42,6 +43,7 @@ def checked(*arguments):
     return output_of("check-plugin", *arguments, columns=120)
 
 
+@pytest.mark.slow
 def test_the_motion_of_a_joint_is_told():
     output = checked("rev", "sph-sph", "--poses", "1")
     assert "motion: 1 rotation about a_j, constant in body j" in output

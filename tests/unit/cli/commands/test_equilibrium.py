@@ -39,6 +39,7 @@ def model(tmp_path, monkeypatch):
     return ["equilibrium", "pendulum.toml", "--over", "parameters.torque=0:12:4"]
 
 
+@pytest.mark.slow
 def test_json(model, capsys):
     """All points, with marks and quantities of each."""
     assert main([*model, "--of", "bob.r.x", "--json"]) == 0

@@ -17,6 +17,7 @@ pytestmark = [
 ]
 
 
+@pytest.mark.slow
 def test_a_model_is_written_as_a_folder_and_not_over_another(tmp_path, capfd, monkeypatch):
     monkeypatch.chdir(tmp_path)
     words = ["export", "pen1", "--format", "c", "-o", "made", "--quantity", "cone.r"]

@@ -34,6 +34,7 @@ def both(scene, t_end=0.5, **settings):
     return [dap.simulate(scene, method=method, **given) for method in ("joint", "lsq")]
 
 
+@pytest.mark.slow
 @pytest.mark.every(3)
 @pytest.mark.parametrize("integrator", ["dop853", "adams", "radau"])
 def test_an_arm_falls_onto_the_floor_and_lies_there(integrator):

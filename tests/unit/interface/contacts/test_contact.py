@@ -49,6 +49,7 @@ def test_a_type_of_ones_own_on_one_body():
     assert not failed
 
 
+@pytest.mark.slow
 def test_a_gap_whose_rate_is_not_the_normal_velocity_is_found():
     class Wrong(Pipe):
         keyword = "wrong"

@@ -12,6 +12,7 @@ from support.plain import jit_is_on
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(st.lists(VALUES, min_size=4, max_size=4))
 def test_complex_numbers_are_numpys(values):

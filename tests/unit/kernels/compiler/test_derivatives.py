@@ -241,6 +241,7 @@ class Drawn(Arrays):
     out: Any
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(programs(), st.integers(2, 5))
 def test_values_of_programs_drawn_at_random_have_their_bits(source, count):

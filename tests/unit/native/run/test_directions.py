@@ -63,6 +63,7 @@ def test_a_cart_on_a_spring_has_the_derivatives_of_its_equation(tmp_path):
         run.directional([rate], {"cart.r.x": 1.0})
 
 
+@pytest.mark.slow
 def test_stepped_contacts_have_derivatives_of_what_the_state_gives(tmp_path):
     """Against differences of outputs; accelerations are means of a step, and have none."""
     scene = falling_ball()

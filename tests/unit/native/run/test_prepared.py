@@ -127,6 +127,7 @@ def door():
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.every(8)
 @pytest.mark.parametrize(
     ("make", "settings"),
@@ -163,6 +164,7 @@ def test_contacts_between_steps_with_inputs_and_saved_states(tmp_path):
                 assert run[name] == here.state[name]
 
 
+@pytest.mark.slow
 def test_drivers_beside_contacts_read_inputs(tmp_path):
     """A ball on a plate that an input moves: it slips, sticks and rolls."""
     scene = dap.Scene(name="plate")

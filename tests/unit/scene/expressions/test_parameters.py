@@ -161,6 +161,7 @@ def test_sweeps_vary_parameters_and_all_that_they_stand_for():
             np.testing.assert_array_equal(sweep[output][k], expected, err_msg=output)
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_fits_find_parameters():
     """From an angle that an output of the scene gives in degrees."""

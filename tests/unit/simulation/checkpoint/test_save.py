@@ -22,6 +22,7 @@ def short_chunks(monkeypatch):
     shorten_chunks(monkeypatch)
 
 
+@pytest.mark.slow
 @long_in_plain_python
 @pytest.mark.parametrize("integrator", quickly(["dop853", "adams", "radau"]))
 def test_rows_that_wait_for_room_come_after_it(integrator, tmp_path, monkeypatch):
@@ -41,6 +42,7 @@ def quarter_car():
     return dap.load("quarter_car")
 
 
+@pytest.mark.slow
 @pytest.mark.every(5)
 @pytest.mark.skipif(not jit_is_on(), reason="takes long in plain Python")
 @pytest.mark.parametrize(

@@ -53,6 +53,7 @@ def referring():
     return scene
 
 
+@pytest.mark.slow
 def test_references_stay_those_of_the_scene(tmp_path):
     """Coordinates of joints at rest, modes and motion are those of the scene, from its state."""
     scene = referring()

@@ -120,6 +120,7 @@ def test_a_solid_has_its_slow_stiffness():
     assert result.quantity("solid.z").values == pytest.approx(WEIGHT / 100.0, abs=1e-12)
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_what_integrates_its_error_finds_the_pose():
     """e = 0 and integral z = m g; slow enough it is stable, with a negative damper it is not."""
@@ -162,6 +163,7 @@ def rod(**fields):
     return scene
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_what_keeps_the_way_of_a_motion_is_refused():
     """The length of a tendon on joints is a state. Held as at the start it pulled nowhere, and the

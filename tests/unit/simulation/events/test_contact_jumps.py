@@ -258,6 +258,7 @@ def thrown_box():
     return dap.simulate(scene, t_end=0.5, dt=0.05)
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_corners_that_strike_together_share_the_work_of_one_jump(tmp_path, recwarn):
     """What all of them do is the change of the kinetic energy; figures and pages have one jump."""

@@ -113,6 +113,7 @@ def test_points_that_have_a_model_each():
     assert path_of(of) == "rebuilt"
 
 
+@pytest.mark.slow
 def test_rates_whose_angles_leave_the_range_of_lanes_are_evaluated_alone(monkeypatch):
     """Beyond 2e5 rad half angles are reduced in another way: steps of 0.1 s at 1e7 rad/s."""
     scene = pendulum()

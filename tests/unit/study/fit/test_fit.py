@@ -377,6 +377,7 @@ def test_mistakes_of_a_file_have_their_lines(tmp_path):
     assert "the file is empty" in mistakes_of(oscillator(), ["forces.spring.k"], path)
 
 
+@pytest.mark.slow
 @compiled
 def test_a_fit_is_drawn(tmp_path):
     """Two panels for each output; a file without a display; an unknown output is an error."""

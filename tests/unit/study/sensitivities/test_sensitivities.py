@@ -196,6 +196,7 @@ def test_corrected_starts_are_exact():
     assert np.max(np.abs(s.of("rocker.w"))) < 1e-9
 
 
+@pytest.mark.slow
 def test_what_derivatives_mean_is_noted():
     def notes(scene, by):
         found = dap.sensitivities(scene, by, t_end=0.02, dt=0.01).result.notes

@@ -29,6 +29,7 @@ def ours():
     return [t for t in threading.enumerate() if t.name == "dap3d-study"]
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_numbers_depend_neither_on_threads_nor_on_portions(ensemble):
     """Bit for bit: one thread, more threads than cores, all points at once, each by itself."""

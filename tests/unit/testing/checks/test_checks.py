@@ -406,6 +406,7 @@ def test_of_a_kernel_that_gives_other_numbers_each_time_nothing_else_is_judged()
     assert "other numbers each time" in outcomes["action and reaction"].words
 
 
+@pytest.mark.slow
 def test_gamma_beside_a_wrong_J_is_compared_with_C():
     """Right or wrong, and the outcome says so; wrong by a known number."""
     gamma = {o.check: o for o in check_type(WrongSignInJ, poses=2).outcomes}["gamma"]
@@ -477,6 +478,7 @@ def test_what_cannot_be_compiled_is_said():
         check()
 
 
+@pytest.mark.slow
 def test_a_report_has_all_that_is_needed_to_see_the_error_again():
     """Seed, pose, fields; the same seed leads to the same numbers, another one to others."""
     report, again, other = (check_type(TermMissingInGamma, poses=1, seed=s) for s in (7, 7, 8))

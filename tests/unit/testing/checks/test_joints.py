@@ -15,6 +15,7 @@ def failures(type_):
     return {o.check: "\n".join(map(str, o.findings)) for o in outcomes if not o.ok}
 
 
+@pytest.mark.slow
 @pytest.mark.every(4)
 @pytest.mark.parametrize("type_", WITH_UNKNOWNS, ids=lambda t: t.keyword)
 def test_joints_that_are_right_pass(type_):
