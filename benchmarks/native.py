@@ -1,7 +1,12 @@
-"""Exported models in C: real time at 1 kHz, the time of a step over that of Python, sizes."""
+"""Exported models in C: real time at 1 kHz, steps over those of Python, sizes, first exports.
 
+``python benchmarks/native.py real_time | steps | sizes ...``: those alone.
+"""
+
+import os
 import statistics
 import subprocess
+import sys
 import tempfile
 import time
 from itertools import chain
@@ -96,6 +101,35 @@ def steps(models=("pen1", "crane", "fourbar3", "quarter_car"), count=500, dt=1e-
     return found
 
 
+#: Exports a model by a process of its own: the seconds that it takes, and bytes of the library.
+FIRST = """
+import sys, time
+import dap3d_core as dap
+start = time.perf_counter()
+made = dap.export_model(sys.argv[1], sys.argv[2], format="c")
+print(time.perf_counter() - start, made.size)
+"""
+
+
+def sizes(models=("gripper", "hand", "humanoid", "walker", "pen1", "fourbar3")):
+    """kB of shared libraries; seconds of an export with an empty cache, and with a full one."""
+    for name in models:
+        with tempfile.TemporaryDirectory() as scratch:
+            env = os.environ | {"DAP3D_CACHE_DIR": f"{scratch}/cache"}
+            lines = []
+            for k in range(2):
+                command = [sys.executable, "-c", FIRST, name, f"{scratch}/{k}"]
+                lines.append(subprocess.check_output(command, env=env, text=True).split())
+        (first, size), (again, _) = lines
+        yield {
+            "model": name,
+            "kB": int(size) / 1e3,
+            "first_s": float(first),
+            "again_s": float(again),
+        }
+
+
 if __name__ == "__main__":
-    for row in chain(real_time(), steps()):
+    parts = {"real_time": real_time, "steps": steps, "sizes": sizes}
+    for row in chain(*(parts[name]() for name in sys.argv[1:] or parts)):
         print(row, flush=True)

@@ -14,6 +14,7 @@ from dap3d_core.formats.export_model import ExportReport
 from dap3d_core.formats.export_model import export_model as export_text
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.formats import ResultExporter
+from dap3d_core.kernels.compiler import background
 from dap3d_core.kernels.compiler.types import CompileError
 from dap3d_core.native.build import PLATFORMS, Platform, platforms_named
 from dap3d_core.native.c_source import PARAMETERS, Variable, data_of, variables_header, variables_of
@@ -309,7 +310,8 @@ def export_model(
     if path is None:
         raise refusal(f"format {kind} needs a path", "give that of the file or folder")
     given |= {"strict": strict, "force": force, "allow_code": allow_code, "registry": registry}
-    return export_native(scene, path, format=kind, fmi=fmi, **given)
+    with background.optimiser.held():
+        return export_native(scene, path, format=kind, fmi=fmi, **given)
 
 
 def _require_format(kind: str, given: Iterable[str]) -> None:

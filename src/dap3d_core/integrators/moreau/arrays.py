@@ -214,6 +214,7 @@ class StepArrays(Arrays):
     y_kept: Floats
     y_bounce: Floats
     y_free: Floats
+    free_speed: Floats  # D v of motion without contacts, m/s
     # scratch
     slopes: Floats  # (2, y) flat: dy/dt
     slots: Integers  # table of the contacts remembered
@@ -242,7 +243,7 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
     layout = model.row_layout
     scratch: dict[str, Any] = {
         **{name: np.zeros(k) for name in (
-            "s", "y", "lead", "pull", "y_kept", "y_bounce", "y_free")},
+            "s", "y", "lead", "pull", "y_kept", "y_bounce", "y_free", "free_speed")},
         **{name: np.zeros((0, 0)) for name in ("felt", "answer")},
         "small": np.zeros(SMALL_SIZE**2 if k else 0),
         "small_step": np.zeros(SMALL_SIZE if k else 0),

@@ -25,8 +25,13 @@ PART, MOST_PARTS, RATE_PASSES, RATE_CHANGE = 0.25, 1000, 8, 1e-7
 
 
 @compiled
-def move_freely(work: Any, s: StepArrays, rhs: Function, system: System, loops: Any) -> None:
-    """Put the state at the end of the step with the last accelerations, as the trial state."""
+def move_freely(
+    work: Any, s: StepArrays, has_rates: bool, rhs: Function, system: System, loops: Any
+) -> None:
+    """Put the state at the end of the step with the last accelerations, as the trial state.
+
+    has_rates: ``slopes`` begins with dy/dt at the start of the step.
+    """
     t, y, free, size = work.t, work.state[Y], work.state[TRIAL], work.state.shape[1]
     slope, middle, parts = s.slopes[:size], s.slopes[size:], parts_of(work, s)
     copy(free, y)
@@ -39,7 +44,9 @@ def move_freely(work: Any, s: StepArrays, rhs: Function, system: System, loops: 
             s.path[b, i] = 0.0
     for k in range(parts):
         begun = t + k * h
-        rhs(begun, free, slope, system, loops)
+        if k > 0 or not has_rates:
+            rhs(begun, free, slope, system, loops)
+            work.rhs_count += 1
         add_pushed(work.pushed, free, slope)
         for i in range(size):
             middle[i] = free[i] + 0.5 * h * slope[i]
@@ -54,7 +61,7 @@ def move_freely(work: Any, s: StepArrays, rhs: Function, system: System, loops: 
             normalise(free, coordinate_offset(b) + 3)
             for i in range(6):
                 s.path[b, i] += s.rest[b, i] / parts
-        work.rhs_count += 2
+        work.rhs_count += 1
 
 
 @compiled
@@ -140,6 +147,7 @@ def size_of(x: Floats, count: int) -> float:
 def largest_rate(work: Any, s: StepArrays, rhs: Function, system: System, loops: Any) -> float:
     """Largest size of an eigenvalue of df/dy, 1/s, by powers of it; one a call, but at the start.
 
+    ``slopes`` then begins with dy/dt.
     Source: the nonlinear power method of Sommeijer, Shampine, Verwer, RKC: an explicit solver
     for parabolic PDEs (J. Comp. Appl. Math. 88, 1997). Of an oscillation two powers are taken
     together: one changes m to m/s, the other back.
@@ -168,6 +176,7 @@ def largest_rate(work: Any, s: StepArrays, rhs: Function, system: System, loops:
             change[i] = slope[i] - at_y[i]
         before, found = found, size_of(change, last) / norm
     work.last_rate = found
+    copy(slope, at_y)
     return math.sqrt(before * found)
 
 

@@ -248,7 +248,7 @@ def assemble(s: StepArrays, weight: float, feels: float) -> None:
                 for i in range(6):
                     at = start + i * s.width
                     part = weight * s.s[k] * s.D[p, i]
-                    for j in range(6):
+                    for j in range(6 if part != 0.0 else 0):
                         K[at + j] += part * s.D[q, j]
 
 
@@ -423,10 +423,12 @@ def solve_blocks(
         for e in range(start[a], start[a + 1]):
             take_from(K[36 * (n + 2 * e + 1) :], x[6 * entries[e] :], own)
         for i in range(6):
-            scratch[i], own[i] = own[i], 0.0
+            scratch[i] = own[i]
         for i in range(6):
+            total = 0.0
             for k in range(6):
-                own[i] += K[36 * a + 6 * i + k] * scratch[k]
+                total += K[36 * a + 6 * i + k] * scratch[k]
+            own[i] = total
 
 
 @compiled
@@ -459,10 +461,12 @@ def multiply(A: Floats, B: Floats, scratch: Floats) -> None:
     """Overwrite a block A with A B."""
     for i in range(6):
         for k in range(6):
-            scratch[k], A[6 * i + k] = A[6 * i + k], 0.0
-        for j in range(6):
-            for k in range(6):
-                A[6 * i + k] += scratch[j] * B[6 * j + k]
+            scratch[k] = A[6 * i + k]
+        for k in range(6):
+            total = 0.0
+            for j in range(6):
+                total += scratch[j] * B[6 * j + k]
+            A[6 * i + k] = total
 
 
 @compiled
@@ -489,5 +493,7 @@ def take(A: Floats, B: Floats, out: Floats) -> None:
 def take_from(A: Floats, x: Floats, out: Floats) -> None:
     """Take A x from six numbers."""
     for i in range(6):
+        left = out[i]
         for k in range(6):
-            out[i] -= A[6 * i + k] * x[k]
+            left -= A[6 * i + k] * x[k]
+        out[i] = left

@@ -150,10 +150,11 @@ def clear(s: StepArrays, out: Floats) -> None:
 def add_pull(s: StepArrays, y: Floats, out: Floats) -> None:
     """Add D^T y."""
     for k in range(y.size):
+        pull = y[k]
         for q in range(s.row_start[k], s.row_start[k + 1]):
-            row = out[s.row_body[q]]
+            row, D = out[s.row_body[q]], s.D[q]
             for i in range(6):
-                row[i] += s.D[q, i] * y[k]
+                row[i] += D[i] * pull
 
 
 @compiled
@@ -214,7 +215,7 @@ def residual_of(s: StepArrays, v: Floats, left: float) -> float:
         left = max(left, left_at(s, c, v))
         largest = max(largest, impulse_of(s, c))
     for k in range(s.y.size):
-        speed = speed_of(s, k, v) - speed_of(s, k, s.free)
+        speed = speed_of(s, k, v) - s.free_speed[k]
         left, largest = max(left, abs(s.s[k] * speed)), max(largest, abs(s.y[k]))
     return left / max(largest, s.least, TINY)
 
@@ -231,7 +232,7 @@ def begin_round(s: StepArrays) -> None:
     for q in range(s.chosen_count):
         put_speeds(s, s.chosen[q], s.v)
     for k in range(s.y.size):
-        s.lead[k] = speed_of(s, k, s.v) - speed_of(s, k, s.free)
+        s.lead[k] = speed_of(s, k, s.v) - s.free_speed[k]
 
 
 @compiled

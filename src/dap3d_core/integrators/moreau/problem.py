@@ -21,6 +21,7 @@ from dap3d_core.integrators.moreau.newton import (
     residual_of,
     rim_of,
     solve_round,
+    speed_of,
     times_inverse,
 )
 from dap3d_core.integrators.moreau.reduced import (
@@ -32,6 +33,7 @@ from dap3d_core.integrators.moreau.reduced import (
     put_felt,
     reduced_round,
 )
+from dap3d_core.integrators.stepping.vector_ops import copy
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -144,6 +146,8 @@ def solve(s: StepArrays, tolerance: float) -> bool:
         for k in range(6):
             s.v[b, k] = s.trial[b, k] = s.free[b, k]
             s.least = max(s.least, LEAST_IMPULSE * s.mass[b] * abs(s.free[b, k if k < 3 else 0]))
+    for k in range(s.y.size):
+        s.free_speed[k] = speed_of(s, k, s.free)
     choose(s, -1)
     if few or joined:
         aim = RESIDUAL_ROUNDING if few and tolerance < NEAR else tolerance
@@ -165,7 +169,11 @@ def solve(s: StepArrays, tolerance: float) -> bool:
         sweep(s, SWEEPS, max(tolerance, NEAR), RELAX)
         if not finish(s, tolerance):
             return False
-    put_velocities(s, s.v)
+    if s.carries == 0:  # ``judge`` has put them
+        for q in range(s.used_count):
+            copy(s.v[s.used[q]], s.trial[s.used[q]])
+    else:
+        put_velocities(s, s.v)
     return True
 
 

@@ -80,13 +80,14 @@ def put_felt(s: StepArrays, passes: int) -> None:
                 s.lead[k] = s.answer[k, column] = 0.0
             if r > 0 and s.kind[c] == CONE and s.mu[c] == 0.0 and s.x[c, r] == 0.0:
                 continue  # it never has an impulse
-            for _ in range(passes):
+            for turn in range(passes):
                 clear(s, s.delta)
                 for side in range(2):
                     row = s.delta[s.bodies[c, side]]
                     for k in range(6):
                         row[k] = s.J[c, 12 * r + 6 * side + k]
-                add_pull(s, s.lead, s.delta)
+                if turn > 0:
+                    add_pull(s, s.lead, s.delta)
                 solve_bodies(s)
                 for k in range(s.y.size):
                     s.lead[k] -= STIFF * s.s[k] * speed_of(s, k, s.delta)
@@ -119,7 +120,7 @@ def meet_joints(s: StepArrays) -> None:
     put_velocities(s, s.v)
     left = largest = 0.0
     for k in range(s.y.size):
-        missed = s.s[k] * (speed_of(s, k, s.v) - speed_of(s, k, s.free))
+        missed = s.s[k] * (speed_of(s, k, s.v) - s.free_speed[k])
         left, largest = max(left, abs(missed)), max(largest, abs(s.y[k]))
         s.lead[k] = -STIFF * missed
     if left <= SOLUTION_ROUNDING * largest:  # it would be of rounding alone

@@ -143,11 +143,12 @@ def fly(work: Any, s: StepArrays, rhs: Function, system: System, loops: Any) -> 
             for k in range(array.size):
                 array[k] = 0.0
         forget(work.memory, 0)
-    if work.step_count % RENEWED == 0:
+    renews = work.step_count % RENEWED == 0
+    if renews:
         work.rate = largest_rate(work, s, rhs, system, loops)
     s.t1 = next_end(work)
     s.h = s.t1 - work.t
-    move_freely(work, s, rhs, system, loops)
+    move_freely(work, s, renews, rhs, system, loops)
 
 
 @compiled

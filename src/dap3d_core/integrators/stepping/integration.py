@@ -171,7 +171,7 @@ class Integration(Restorable):
             integer=np.zeros(len(self.state_class.indices("integer")), dtype=np.int64),
             times=instants,
             state=np.zeros((self.state_rows, y.size)),
-            rows=np.empty((buffer_rows, 1 + y.size + report_size)),
+            rows=np.zeros((buffer_rows, 1 + y.size + report_size)),
             switches=np.zeros((at.SWITCH_ROWS, count)),
             crossings=np.zeros((at.LOGGED if count else 0, 3)),
             tolerance=tolerance_of(y.size, atol, kinds),

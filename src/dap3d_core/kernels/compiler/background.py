@@ -13,6 +13,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -36,13 +37,31 @@ class Optimiser:
         self._process: Any = None
         self._polled = 0.0
         self._spent = 0.0
+        self._is_held = False
+        self._waiting: list[Any] = []
+
+    @contextlib.contextmanager
+    def held(self) -> Iterator[None]:
+        """Request nothing within, as of units that little is computed by; later, where they run."""
+        before, self._is_held = self._is_held, True
+        try:
+            yield
+        finally:
+            self._is_held = before
 
     def add(self, unit: Any) -> None:
         """Request optimised code for a unit, from the second process where there can be one."""
         with self._lock:
             self.units.append(unit)
-        if unit.path is not None:
-            self.request(unit.text, unit.results, unit.path)
+            self._waiting.append(unit)
+        if not self._is_held:
+            self._request_waiting()
+
+    def _request_waiting(self) -> None:
+        waiting, self._waiting = self._waiting, []
+        for unit in waiting:
+            if unit.path is not None:
+                self.request(unit.text, unit.results, unit.path)
 
     def request(self, text: str, results: list[Any], path: Path) -> bool:
         """Let the second process write optimised code of LLVM IR; False where there is none."""
@@ -84,8 +103,11 @@ class Optimiser:
         Args:
             seconds: run time of unoptimised code since the last call.
         """
+        if self._is_held:
+            return
         now = time.perf_counter()
         self._spent += seconds
+        self._request_waiting()
         if now - self._polled < POLL_INTERVAL or not self._lock.acquire(blocking=False):
             return
         try:

@@ -91,7 +91,10 @@ class Unit:
 
     def fresh_text(self, symbols: list[str]) -> str:
         """LLVM IR of the unit under other symbols; also where its code was loaded."""
-        return self.write(symbols)[0]
+        text = self.text or self.write(symbols)[0]
+        for old, new in zip(self.symbols if self.text else (), symbols, strict=False):
+            text = text.replace(f"@{old}(", f"@{new}(")
+        return text
 
     def register_slot(self, table: Any, index: int, k: int) -> None:
         """Store the address of function k in a table, now and whenever it changes."""

@@ -11,6 +11,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from dap3d_core.assembly.evaluate import place_state
 from dap3d_core.formulations import REPORT, RHS
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.compiler.derivatives import differentiate
@@ -52,6 +53,12 @@ def report_along(place: DirectionArrays, functions: Any, system: Any, loops: Any
 
 
 @compiled
+def bodies_along(place: DirectionArrays, functions: Any, system: Any, loops: Any) -> None:
+    """The bodies there, where outputs read no more of a report."""
+    place_state(place.row[1 : 1 + place.rates.shape[0]], system)
+
+
+@compiled
 def element_along(
     place: DirectionArrays, values: Any, loops: Any, arrays: Any, q: int, i0: int, p0: int,
     first: int, second: int, third: int,
@@ -74,9 +81,9 @@ class PairUnit:
         self._unit = unit
         self.name, self.symbols = f"{unit.name}-d{PAIR}", unit.symbols
 
-    def write(self, symbols: list[str]) -> tuple[str, list[Any]]:
+    def fresh_text(self, symbols: list[str]) -> str:
         """As of ``Unit``."""
-        return differentiate(self._unit.fresh_text(symbols), PAIR), []
+        return differentiate(self._unit.fresh_text(symbols), PAIR)
 
 
 @attrs.frozen(eq=False)
@@ -116,7 +123,9 @@ class Directions:
         self._prepared, self._elements = prepared, elements
         given = self.arrays, prepared.functions, evaluator.system, evaluator.loops
         self.rates = None if prepared.steps_contacts else _pair(rates_along, given)
-        self.report = _pair(report_along, given)
+        #: A report may be much code: of all equations.
+        self._reports = outputs.reads_report or not evaluator.coordinates.are_of_bodies
+        self.report = _pair(report_along if self._reports else bodies_along, given)
         calls = elements.calls
         self.elements = [
             _pair(element_along, (self.arrays, elements.arrays, c.table, c.arrays), 6)
@@ -125,6 +134,7 @@ class Directions:
         self.symbol = f"{SYMBOL}_along"
         self.text = differentiate(outputs.text.replace(SYMBOL, self.symbol), PAIR)
         tables = [prepared.functions, evaluator.loops, *(c.table for c in calls)]
+        tables = tables if self._reports or self.rates else []
         self._tables = list({id(table): table for table in tables}.values())
         prepared.more.append(self.arrays)
 
@@ -146,7 +156,8 @@ class Directions:
     def codes(self) -> dict[int, PairEntry]:
         """Word of the second memory -> function whose address stands there."""
         image = self._prepared.image
-        functions = {REPORT} if self.rates is None else {RHS, REPORT}
+        functions = {RHS} if self.rates else set()
+        functions |= {REPORT} if self._reports else set()
         return {
             PAIR * image.at(table) + k: PairEntry.of(entry)
             for table in self._tables

@@ -68,14 +68,19 @@ class Image:
             self._arrays[address_of(part), part.nbytes] = part
 
     def _merged(self) -> list[tuple[int, int]]:
-        """First and last address of each piece of memory; arrays that overlap share one."""
-        blocks: list[tuple[int, int]] = []
+        """First and last address of each piece of memory; arrays that overlap share one.
+
+        In the order in which arrays are found, so that equal models have equal memory.
+        """
+        found = {key: k for k, key in enumerate(self._arrays)}
+        blocks: list[tuple[int, int, int]] = []  # its place in that order, first, last address
         for start, size in sorted(self._arrays):
-            if blocks and start < blocks[-1][1]:
-                blocks[-1] = blocks[-1][0], max(blocks[-1][1], start + size)
-            else:
-                blocks.append((start, start + size))
-        return blocks
+            k, end = found[start, size], start + size
+            if blocks and start < blocks[-1][2]:
+                before, start, last = blocks.pop()
+                k, end = min(k, before), max(end, last)
+            blocks.append((k, start, end))
+        return [(start, end) for _, start, end in sorted(blocks)]
 
     def _fill(self) -> None:
         for array in self._arrays.values():

@@ -78,6 +78,7 @@ class Outputs:
         text: LLVM IR of the function that computes them.
         left_out: outputs of the scene that compiled code does not compute.
         elements: that they are of.
+        reads_report: they read more than time, inputs, and bodies as their state places them.
     """
 
     names: list[str]
@@ -85,6 +86,7 @@ class Outputs:
     text: str
     left_out: list[str]
     elements: Elements
+    reads_report: bool
 
 
 def outputs_of(prepared: PreparedRun, names: Sequence[str] | None) -> Outputs:
@@ -138,8 +140,9 @@ def outputs_of(prepared: PreparedRun, names: Sequence[str] | None) -> Outputs:
     program.text.append(_FUNCTION.format(symbol=SYMBOL, body="\n".join(tracer.lines)))
     prepared.more += quantities.elements.finish()
     names_of = [name for name in chosen if name not in left_out]
-    text = program.module()
-    return Outputs(names_of, found, text, list(left_out.values()), quantities.elements)
+    reads = quantities.reads_report or bool(quantities.elements.calls)
+    text, left = program.module(), list(left_out.values())
+    return Outputs(names_of, found, text, left, quantities.elements, reads)
 
 
 @IGNORE_FLOAT_ERRORS
@@ -156,7 +159,7 @@ class _Quantities:
         self._tracer, self._result, self._prepared = tracer, result, prepared
         self.elements = Elements(prepared)
         #: False once a value needs rates.
-        self.is_of_state = True
+        self.is_of_state, self.reads_report = True, False
         self._values = NumberArray(tracer, "%elements")
         model = self._model = prepared.evaluator.model
         self._body = NumberArray(tracer, "%bodies", width=BODY_WIDTH)
@@ -307,6 +310,7 @@ class _Quantities:
         return tuple(self._vector(body, A + 3 * k) for k in range(3))
 
     def _reported(self, part: str, k: int) -> Any:
+        self.reads_report = True
         if part in ("v_dot", "Lam") or (part, k) == ("residuals", 2):
             self.is_of_state = False
         return self._row[self._report + self._layout[part].start + k]

@@ -7,6 +7,7 @@ from support.jumping import JUMPING
 from tests.unit.native.test_export import differences, exported
 
 import dap3d_core as dap
+from dap3d_core.native.run.prepared import PreparedRun
 
 
 @pytest.mark.every(6)
@@ -213,3 +214,10 @@ def test_what_contacts_cannot_do_ends_the_run_with_their_name(tmp_path):
     for t in (1.0, 1.0):
         with pytest.raises(dap.SimulationError, match=r"t = 0\.6 s: contact hinge_.* closes, and"):
             run.step_to(t)
+
+
+def test_equal_models_have_equal_memory():
+    """Wherever the arrays of the run are: an export gives the same files every time."""
+    one, other = (PreparedRun(dap.load("gripper")).image for _ in range(2))
+    assert np.array_equal(one.words, other.words)
+    assert one.addresses == other.addresses
