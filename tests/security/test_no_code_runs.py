@@ -168,6 +168,7 @@ ALLOWED = {
     ("testing/packages.py", "subprocess"): "pytest, on the tests of packages, when it is asked for",
     ("plot/film/animation.py", "subprocess"): "ffmpeg, without a shell",
     ("native/build.py", "subprocess"): "a C compiler, on C that is written here, without a shell",
+    ("native/beside.py", "subprocess"): "Python itself, to compile half of an export",
     ("simulation/checkpoint/save.py", "allow_pickle"): "switched off",
     (
         "study/workers/dask_cluster.py",
