@@ -32,6 +32,7 @@ def test_published_matrices():
         np.testing.assert_allclose(matrix, numbers, rtol=0.0, atol=1e-14 * np.abs(numbers).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [3.0, 5.0, 8.0])
 def test_small_motions_follow_the_linear_equations(speed):
     """Lean and steer of a run; at 3 m/s they grow 30-fold, and their third power with them."""
@@ -45,6 +46,7 @@ def test_small_motions_follow_the_linear_equations(speed):
                                    + 1e-8 * size)  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("speed", "grows"), [(3.0, True), (5.0, False)])
 def test_growth_of_the_weave(speed, grows):
     """The rate of a run, seen along the left eigenvector of the weave, is its eigenvalue.

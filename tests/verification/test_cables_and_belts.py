@@ -115,6 +115,7 @@ def belt(crossed, by_joints=False):
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("crossed", "by_joints"), [(False, False), (True, False), (False, True)])
 def test_a_belt_carries_a_moment(crossed, by_joints):
     """Steady acceleration: the rigid ratio, T_tight - T_slack = moment / r, and bearing loads.

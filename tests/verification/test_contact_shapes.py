@@ -68,6 +68,7 @@ def test_a_ball_slides_over_the_rim_of_a_standing_cylinder():
     assert lift.u[2] / small == pytest.approx(leaves_at(v, small), abs=TOLERANCE)
 
 
+@pytest.mark.slow
 def test_a_lying_cylinder_slides_then_rolls_with_two_thirds_of_its_speed():
     v, mu, radius = 3.0, 0.3, 0.1
     scene = dap.Scene(name="roller")
@@ -190,6 +191,7 @@ def test_a_box_rests_on_another_while_its_centre_is_above_it(offset, yaw):
     assert result.contact("upper").normal_force.sum(axis=1) == pytest.approx(G, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_box_tips_over_the_edge_of_another_where_its_centre_is_beyond():
     """J about the edge w_dot = m g x, x = 1e-4 m: the angle x m g / (2 J) t^2 at first."""
     result = dap.simulate(stack(0.0501), t_end=0.02, dt=0.01, **TIGHT)
@@ -244,6 +246,7 @@ def wheel(r_dot=(0.0, 0.0, 0.0), w=(0.0, 0.0, 0.0), centre=(0.0, 0.0, 0.0), **co
     return scene
 
 
+@pytest.mark.slow
 def test_a_disk_rolls_as_the_joint_disk_does():
     """Leaning and turning, without slip: the same motion by other rows and another method."""
     lean = 1.1

@@ -135,6 +135,7 @@ def test_a_ball_slides_then_rolls_with_five_sevenths_of_its_speed(integrator):
     assert result.ledger["energy"].value < TOLERANCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_a_coulomb_oscillator_stops_where_its_spring_no_longer_overcomes_friction(integrator):
     mu, k, x = 0.2, 100.0, 0.1
@@ -345,6 +346,7 @@ def test_at_usual_tolerances_instants_and_states_are_right_to_a_millionth():
     assert result.rd[-1, 0, 0] == pytest.approx(5.0 / 7.0 * v, abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mu", "part", "dof"), [(0.5, 5.0 / 7.0, 3), (0.0, 1.0, 5)])
 def test_a_ball_in_a_bowl_swings_as_it_rolls_or_slides(mu, part, dof):
     """Linearised in the mode of a run: w^2 = 5/7 g / (R - r) of a ball that rolls."""

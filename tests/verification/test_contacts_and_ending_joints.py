@@ -106,6 +106,7 @@ def test_a_clutch_turns_a_wheel_that_friction_holds():
     assert np.abs(result.w[later, :, 2] - braked[later, None]).max() < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["dop853", "adams"])
 def test_a_rod_that_holds_a_block_on_a_slope_breaks_under_a_growing_load(integrator):
     """It carries m g sin(a) + 10 t: the block then slides down without friction."""

@@ -51,6 +51,7 @@ def ladder(angle, mu):
     return scene
 
 
+@pytest.mark.slow
 def test_a_ladder_rests_where_its_tangent_exceeds_half_the_inverse_of_friction():
     mu = 0.4
     limit = np.arctan(0.5 / mu)
@@ -78,6 +79,7 @@ def test_a_ball_comes_to_rest_at_the_bottom_of_a_bowl(mu):
     assert found.stable
 
 
+@pytest.mark.slow
 def test_bodies_do_not_rest_in_each_other():
     scene = dap.Scene(name="pressed")
     scene.add_body("ball", mass=1.0, Jp=[0.004] * 3, r=[0.0, 0.0, 0.2])

@@ -61,6 +61,7 @@ def test_an_arm_at_500_hz_for_5_s(method):
     assert np.max(np.abs(found(result) - wanted) / np.maximum(1.0, scale)) < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["standard", "joint"])
 def test_an_arm_for_a_moment(method):
     """The same over 20 ms, from rest, where accelerations are the largest."""
@@ -82,6 +83,7 @@ def test_linearised_inputs_are_those_of_the_joint_equations():
     assert pytest.approx((np.array(columns) @ axes).T, rel=1e-10, abs=1e-9) == lin.D
 
 
+@pytest.mark.slow
 def test_a_state_of_a_controlled_run_is_linearised_with_its_inputs():
     """The rates of the lower half of A x + B u: eigenvalues are those with the inputs held."""
     scene = arm_scene()
@@ -114,6 +116,7 @@ def test_equilibrium_is_found_with_inputs_held():
     assert equilibrium.stable
 
 
+@pytest.mark.slow
 def test_inputs_vary_in_sweeps():
     """As all that a scene holds: each point has its own, in batches as well."""
     scene = dap.Scene(name="pushed")

@@ -110,6 +110,7 @@ def test_a_ball_rolls_through_a_bowl():
     assert result.ledger["energy"].value < TOLERANCE
 
 
+@pytest.mark.slow
 def test_a_ball_slides_round_in_a_bowl():
     """Without friction, on a level circle of its centre: Omega^2 rho = g tan(slope)."""
     k, radius, x = 0.8, 0.1, 0.5
@@ -144,6 +145,7 @@ def test_a_surface_may_move_and_be_below():
     assert first(result, "impact").t == pytest.approx(t, abs=TOLERANCE)
 
 
+@pytest.mark.slow
 def test_a_skier_takes_off_before_the_top():
     """On y = h cos(x), without friction: v^2 = v_0^2 + 2 g h (1 - cos(x)), v_0 at the top.
 

@@ -125,6 +125,7 @@ def test_a_spring_loses_its_cam():
     assert first(result, "impact").t == pytest.approx(lands, abs=TOLERANCE)
 
 
+@pytest.mark.slow
 def test_the_nearest_point_of_all_counts():
     """A point flies through an ellipse, where up to four feet of perpendiculars compete."""
     scene = dap.Scene(name="ellipse")
@@ -142,6 +143,7 @@ def test_the_nearest_point_of_all_counts():
     assert result.contact("wall").gap == pytest.approx(least, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_a_ball_leaves_a_wire():
     """On a ring of radius a it leaves at cos = 2/3 + v^2 / (3 g L), L = a + radius + radius_j."""
     a, radius, thick, v = 0.5, 0.08, 0.02, 0.4
@@ -185,6 +187,7 @@ def test_a_ball_swings_in_a_pipe():
     assert contact.at[-1] == pytest.approx([0.0, 0.0, -a - pipe], abs=TOLERANCE)
 
 
+@pytest.mark.slow
 def test_a_ball_rests_on_two_parts_of_a_hollow():
     """In y = k x^2, where 1 + y'^2 = (2 k R)^2: each pushes m g k R; none beyond its end."""
     k, radius, mass = 40.0, 0.1, 0.5
@@ -208,6 +211,7 @@ def test_a_ball_rests_on_two_parts_of_a_hollow():
     assert result.r[-1, 1, 1] == pytest.approx(50.0 - 0.5 * G, abs=TOLERANCE)
 
 
+@pytest.mark.slow
 def test_a_bead_slides_down_a_helix():
     """Along it by g sin(pitch) t^2 / 2, for several turns; the wire turned and moved on a body."""
     radius, rise = 0.3, 0.05
@@ -265,6 +269,7 @@ def add_lines(x, y, **fields):
     return add
 
 
+@pytest.mark.slow
 def test_curves_that_are_none_are_refused():
     """With what is wrong, where, and what to do."""
     corners = [0.2, 0.0, -0.2, 0.0, 0.2], [0.0, 0.2, 0.0, -0.2, 0.0]

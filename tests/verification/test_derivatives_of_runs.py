@@ -39,6 +39,7 @@ def oscillation(t, m, k, c, l0, x0, v0):
     return l0 + np.exp(-delta * t) * (a * np.cos(omega * t) + b * np.sin(omega * t))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["dop853", "dopri5", "adams"])
 def test_an_oscillator(integrator):
     by = ["bodies.mass.mass", "forces.spring.k", "forces.spring.c", "forces.spring.l0",
@@ -98,6 +99,7 @@ def test_by_the_direction_of_an_axis_along_another(aside):
     assert s.of("block.r")[..., 0] == pytest.approx(expected, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_by_the_direction_of_an_axis_whose_normals_jump():
     """Where one component of an axis is above the least by a fiftieth, its normals are others on
     either side: the derivative is taken on one."""
@@ -229,6 +231,7 @@ def test_large_reactions_beside_a_top(method):
     close(turning(1e6), turning(1.0), 1e-11)
 
 
+@pytest.mark.slow
 def test_a_bouncing_ball():
     """Height, and the instant of the bounce, by e, g, height and speed at the start."""
     scene = bouncing()

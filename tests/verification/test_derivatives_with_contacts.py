@@ -84,6 +84,7 @@ def test_derivatives_are_those_of_differences_where_a_ball_bounces_with_friction
             assert found.final(f"ball.r.{c}")[k] == pytest.approx(slope[axis], rel=1e-6, abs=1e-7)
 
 
+@pytest.mark.slow
 def test_contacts_that_share_a_load_and_slide_are_refused_by_name():
     scene = dap.Scene(name="box")
     motion = {"r_dot": [2.0, 0.3, 0.0], "w": [0.0, 0.0, 5.0]}
@@ -94,6 +95,7 @@ def test_contacts_that_share_a_load_and_slide_are_refused_by_name():
         dap.sensitivities(scene, ["contacts.floor.mu"], t_end=0.1, dt=0.1)
 
 
+@pytest.mark.slow
 def test_a_wheel_that_its_loaded_pin_stops_by_friction_and_radius():
     """It turns by I w^2 / (2 mu R m g), and stops at I w / (mu R m g)."""
     mu, radius, inertia, w = 0.3, 0.02, 0.1, 2.0

@@ -197,6 +197,7 @@ def balanced_lamp():
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("make", "indifferent"), [(across_a_spring, 0), (balanced_lamp, 1)])
 def test_without_first_order_stiffness_it_holds_or_is_indifferent(make, indifferent):
     found = dap.equilibrium(make())

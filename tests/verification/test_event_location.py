@@ -77,6 +77,7 @@ def test_a_level_below_an_apex_is_passed_twice(flight, d, every):
     assert result.stats.steps < 20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", quickly(["dop853", "dopri5", "adams", "radau"]))
 @pytest.mark.parametrize("method", ["standard", "joint"])
 def test_turning_points_of_a_pendulum(integrator, method):
@@ -162,6 +163,7 @@ def test_several_events_in_one_step_in_order(flight):
     assert sorted(e.name for e in result.events) == sorted(2 * "0123")
 
 
+@pytest.mark.slow
 def test_a_resumed_run_finds_the_same_events(flight, tmp_path):
     """Bit for bit, after an interruption between the two passages."""
     apex = 50.0 / G
@@ -189,6 +191,7 @@ def test_an_every_without_end_is_refused(flight, every):
         dap.simulate(flight, t_end=2.0, events=[dap.Event("b.r.z", at=5.0, every=every)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("every", [2e-3, 1.0, 1e300])
 def test_every_changes_no_event(flight, every):
     result = dap.simulate(
@@ -200,6 +203,7 @@ def test_every_changes_no_event(flight, every):
     )
 
 
+@pytest.mark.slow
 def test_windows_are_narrowed_to_what_cannot_hide_a_crossing():
     """A sampler finds a dip of any place and width; unseen ones would show at some place."""
     for place in np.linspace(0.01, 0.99, 50):
@@ -271,6 +275,7 @@ def test_no_step_samples_the_law_behind_a_stop(integrator, settings):
     assert found[0].u_after[9] == pytest.approx(0.8 * G * fall, abs=1e-13)
 
 
+@pytest.mark.slow
 def test_rk4_keeps_its_order_with_an_event():
     """The instant of an event converges as h^4: the ratio for half the step is about 16."""
     scene = pendulum(RELEASE)

@@ -70,6 +70,7 @@ def test_the_first_bounce(registry, integrator, settings, tolerance):
     assert apex.u[2] == pytest.approx(APEX, abs=10.0 * tolerance)
 
 
+@pytest.mark.slow
 def test_speeds_at_the_touch_and_after(registry):
     """N3: the speed where the ball touches, and where it leaves."""
     speeds = []

@@ -78,6 +78,7 @@ def planetary(type_="gear", **fields):
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["standard", "joint"])
 def test_a_planetary_gear_obeys_willis_and_adds_up_inertia(method):
     """The carrier turns by z_s / (z_s + z_r) of the sun, over many turns."""

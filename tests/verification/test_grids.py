@@ -70,6 +70,7 @@ def wanted(surface, x, y):
     return [float(surface([x, y], nu=order)) for order in ORDERS]
 
 
+@pytest.mark.slow
 def test_a_grid_is_the_natural_spline_of_both_arguments():
     """Six numbers, at and between the points: rounding of second derivatives of some 1e2."""
     found, surface = probed(z=Z), spline(Z)
@@ -132,6 +133,7 @@ def test_a_grid_that_cannot_be(fields, words):
         probed(**fields)
 
 
+@pytest.mark.slow
 def test_a_ball_on_measured_terrain():
     """Minimal coordinates x, y by SciPy, whose Lagrangian has the height and its derivatives.
     m (1 + h_x^2) x'' + m h_x h_y y'' + m h_x (h_xx x'^2 + 2 h_xy x' y' + h_yy y'^2) + m g h_x = 0.

@@ -41,6 +41,7 @@ def simulated(t_end, rtol):
     )
 
 
+@pytest.mark.slow
 def test_the_double_pendulum_by_taylor_series():
     """Published digits of its tip at 0.5 and 1 s, which have twelve, from another program; and its
     energy, which no series knows of, to all but the last digits of 30."""
@@ -85,6 +86,7 @@ def test_no_note_where_digits_remain():
     assert not any("beyond 0.001" in note for note in simulated(2.0, 1e-8).notes)
 
 
+@pytest.mark.slow
 def test_the_instants_of_the_flips():
     """Where omega_2 of Euler's equations, integrated at 3e-14, passes zero within 11 s."""
     expected = flips.instants(11.0)

@@ -169,6 +169,7 @@ class Lock(Joint):
         return sub(scale(s * factor, e), (0.0, 0.0, f))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.0, 0.5])
 def test_a_joint_keeps_the_guards_of_its_position(rate):
     """Identity is on the manifold: J is the identity there, and nu the prescribed rate.
@@ -219,6 +220,7 @@ def test_a_function_keeps_its_guards():
     assert compiled.evaluator.function_values(0.0)[0, 3] == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("type_", [Inside, Outside, Logarithm, Polar, Lock, Wave])
 def test_check_plugin_finds_nothing_wrong_with_guards(type_):
     report = check_type(type_)
@@ -246,6 +248,7 @@ class Corner(Force):
         return sqrt(norm2(r_P_i))
 
 
+@pytest.mark.slow
 def test_check_plugin_tries_exact_rest():
     """A missing guard is a finding where the energy is smooth, and a note where it has a corner."""
     report = check_type(Unguarded)

@@ -52,6 +52,7 @@ def test_what_passes_by_the_page_passes(case, attempt):
     assert case.error(case.simulate(attempt)) <= case.limit(attempt)
 
 
+@pytest.mark.slow
 def test_a_step_over_the_contact_shows_in_the_ledger():
     """Steps of 1e-4 s, as long as the contact: the run ends, and its energy says it is wrong."""
     case = next(case for case in CASES if case.name == "stiff contact")
@@ -163,6 +164,7 @@ def test_velocities_are_projected_though_old_factors_do_not_serve():
     assert result.ledger["position"].value < 1e-14
 
 
+@pytest.mark.slow
 def test_other_units_give_the_same_motion():
     """A03 in mm, g and ms and in SI, the same 500 steps of dop853: to 1e-11 of its size.
     Factors of 1000 are no powers of two, so every number is rounded, and the motion multiplies that

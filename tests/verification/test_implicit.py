@@ -191,6 +191,7 @@ def test_reporting_times_cost_no_steps_and_no_order():
     assert order_of(np.array(errors)) == pytest.approx(5.0, abs=0.4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("w", [30.0, 300.0])
 @pytest.mark.parametrize("rtol", [1e-10, 1e-12])
 def test_components_at_zero_do_not_loosen_the_iteration(w, rtol):

@@ -245,6 +245,7 @@ def test_the_ledger_has_the_work_of_a_motor():
     assert not dap.compile(scene).is_conservative
 
 
+@pytest.mark.slow
 def test_kinematics_over_the_coordinate_of_a_motor():
     """Its own coordinate takes the place of a speed."""
     scene = machine()

@@ -60,6 +60,7 @@ def test_a_ball_rolls_round_a_turntable_at_two_sevenths_of_its_rate(method):
     assert implicit.stats.rejected <= 0.1 * implicit.stats.steps
 
 
+@pytest.mark.slow
 def test_steps_on_a_turntable_are_of_second_order():
     """Half of the step leaves a quarter of the error, which is less than 1e-4 m at 2 ms."""
     scene, path = turntable()

@@ -24,6 +24,7 @@ def ball(angle=0.0, v=0.0, w=(0.0, 0.0, 0.0), **law):
     return scene
 
 
+@pytest.mark.slow
 def test_a_ball_rests_up_to_the_limit_of_a_slope():
     """N = m g cos, and a moment m g R sin, at a part of 0.999 of the limit; beyond it rolls."""
     below, above = (np.arctan(part * MU_ROLL / R) for part in (0.999, 1.001))
@@ -65,6 +66,7 @@ def test_linearised_a_ball_rolls_against_a_moment_that_its_weight_bounds():
         assert np.abs(point.eigenvalues - value).min() < 1e-9 * abs(value)
 
 
+@pytest.mark.slow
 def test_linearised_what_holds_is_kept():
     """A ball on a spring swings in two directions; one that resists rolling in none."""
     for mu_roll in (0.0, 0.5):
@@ -103,6 +105,7 @@ def test_inverse_dynamics_finds_the_forces_of_a_run(scene):
         assert have == pytest.approx(expected, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_inverse_dynamics_says_where_a_ball_would_have_to_resist_more():
     """By 0.9 - 0.5 of m g R tan, a moment, less what a larger normal force would hold."""
     angle = np.arctan(0.9 * MU_ROLL / R)
@@ -124,6 +127,7 @@ def test_inverse_dynamics_takes_laws_of_ones_own():
     assert have == pytest.approx(expected, abs=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not jit_is_on(), reason="derivatives are those of compiled code")
 def test_derivatives_of_where_and_when_a_ball_stops():
     """x = v^2 / 2 a at t = v / a, a = g mu_roll / (1.4 R); of a change of v alone it slips at once,

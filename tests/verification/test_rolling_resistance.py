@@ -186,6 +186,7 @@ def wheel(type_, v=1.0, **fields):
     return dap.compile(scene_on_wheel(type_, v, **fields), registry=registry_of(type_))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("contact", "limit"), [("events", 1e-9), ("stepping", 1e-6)])
 def test_a_type_of_one_s_own_says_what_resists(contact, limit):
     """Of steps of 2 ms the last is off by a part of a h^2 / 2, 3e-7 m."""
@@ -204,6 +205,7 @@ def test_check_plugin_takes_lengths_that_are_not_negative_alone():
     assert words in str(check.run())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("contact", ["events", "stepping"])
 def test_a_run_ends_where_a_length_becomes_negative(contact):
     """v dv/dx = -a (1 - 2 x), a = 0.02 g / (1.4 R), up to x = 0.5; steps look every 2 ms."""
@@ -225,6 +227,7 @@ def test_of_pairs_that_are_not_named_the_mean_counts_and_the_pair_where_it_is():
         assert result.rd[-1, 0, 0] == pytest.approx(1.0 - 0.5 * a * mu_roll, abs=1e-10)
 
 
+@pytest.mark.slow
 def test_a_cart_on_wheels_slows_down_by_what_its_wheels_resist():
     """However the load is shared: mu_roll M g / R over M and the inertia of the wheels."""
     scene, v, mu_roll, whole = dap.Scene(name="cart"), 2.0, 0.004, 5.0 + 4 * M

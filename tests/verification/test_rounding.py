@@ -131,6 +131,7 @@ def test_radau_is_not_held_up_by_multipliers_that_have_yet_to_settle():
     np.testing.assert_allclose(close.r[:, 1, :2] - [2.0, 0.0], expected, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_radau_takes_multipliers_as_known_to_their_last_digits():
     """Steps of 1e9 kg on a rod of 1 kg are those of 100 kg, whatever rounding 1e10 N have, but for
     the higher orders, which need more digits of multipliers than there are; the motion is that of

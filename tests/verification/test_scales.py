@@ -315,6 +315,7 @@ def bouncing_ball(length, time=1.0):
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("length", "time"),
     [(1e-4, 1.0), (1e-6, 1.0), (1e-7, 1.0), (1e-9, 1.0), (1e-6, 1e-3), (1e3, 1.0), (1e6, 1.0)],

@@ -130,6 +130,7 @@ def test_independent_hinges_run_as_before():
     assert result.w[-1, 0, 2] == pytest.approx(wanted, abs=1e-9)  # rtol 1e-10 of 3 rad/s
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unit", quickly([1.0, 1e3, 1e-3]))
 @pytest.mark.parametrize("integrator", ["dop853", "adams"])
 def test_the_least_share_is_that_of_its_definition(integrator, unit):
@@ -144,6 +145,7 @@ def test_the_least_share_is_that_of_its_definition(integrator, unit):
     assert result.ledger["energy"].ok
 
 
+@pytest.mark.slow
 def test_little_friction_converges_too():
     """Mu = 1e-6: what remains of the load is rounding, and no iteration fails by it."""
     result = dap.simulate(door(mu=1e-6, shared="least"), t_end=3.0)

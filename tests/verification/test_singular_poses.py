@@ -168,6 +168,7 @@ def test_the_implicit_integrator_is_taken_across(make, rtol):
     assert result.ledger["position"].ok
 
 
+@pytest.mark.slow
 def test_an_event_within_a_crossing_of_the_implicit_integrator():
     """Behind the pose, within the step across: there y is what the closed equation says, to the
     error of the run."""
@@ -236,6 +237,7 @@ def test_the_work_of_a_motion_that_is_prescribed(rtol):
     assert np.abs(result.work).max() < 1e3 * rtol * np.ptp(result.energy.potential)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rtol", [1e-8, 1e-9])
 def test_rows_that_depend_on_others_on_the_constraints_alone(rtol):
     """Bennett's linkage with radau: off the constraints its redundant rows hold the motion. It had

@@ -141,6 +141,7 @@ def test_a_hand_that_is_pulled_too_far_is_named():
     assert caught.value.result.t[-1] == pytest.approx(3.7, abs=0.06)
 
 
+@pytest.mark.slow
 def test_drivers_that_come_to_disagree_are_named():
     """Both turn one crank, by t and by sin t: as fast and as little accelerated at the start."""
     scene = dap.Scene(name="two drivers")

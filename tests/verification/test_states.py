@@ -109,6 +109,7 @@ def test_hysteresis_of_bouc_and_wen(integrator):
     assert result.quantity("element.z").values == pytest.approx(z, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["radau", "auto"])
 def test_friction_of_bristles(integrator):
     """LuGre: a mass on a spring slides, turns back, and comes to rest with bent bristles."""

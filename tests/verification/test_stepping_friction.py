@@ -20,6 +20,7 @@ def loaded(part):
     return scene, (part - 1.0) * moment / inertia
 
 
+@pytest.mark.slow
 def test_a_loaded_hinge_does_not_creep():
     """Limit: rounding of a turn."""
     result = dap.simulate(loaded(0.999)[0], t_end=60.0, dt=30.0, **STEPS)

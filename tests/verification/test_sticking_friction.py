@@ -79,6 +79,7 @@ def test_a_block_that_is_pulled_sticks_and_slips():
     assert instants == pytest.approx(expected, rel=0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_hinge_under_load_does_not_creep():
     """At 0.999 of its friction over 1000 s, to 1e-14; at 1.001 it turns from the start on."""
     n = 0.4

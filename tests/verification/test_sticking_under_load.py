@@ -126,6 +126,7 @@ def test_a_block_on_a_belt_sticks_and_slips():
     assert abs(result.ledger["energy"].value) < 1e-9
 
 
+@pytest.mark.slow
 def test_an_overhung_shaft_in_two_bearings():
     """Bearings at 0 and L, the mass c before them: loads m g (1 + c / L) and m g c / L."""
     m, inertia, spin, c, L, mu, R = 3.0, 0.02, 30.0, 0.1, 0.4, 0.2, 0.01
@@ -377,6 +378,7 @@ def test_a_mechanism_comes_to_rest_in_all_its_joints(mu, kind):
             assert np.all(np.linalg.norm(rub.friction, axis=-1) <= limit * (1.0 + 1e-9))
 
 
+@pytest.mark.slow
 def test_a_mechanism_that_is_driven_keeps_its_energy():
     """Loads of four joints that depend on each other: what is lost is what friction took."""
     scene = slider_crank(5.0, 0.3)
@@ -385,6 +387,7 @@ def test_a_mechanism_that_is_driven_keeps_its_energy():
     assert abs(result.ledger["energy"].value) < 1e-9
 
 
+@pytest.mark.slow
 @long_in_plain_python
 @pytest.mark.parametrize(
     ("scene", "t_end"),

@@ -56,6 +56,7 @@ def test_a_motion_that_decays_is_not_stiff_while_it_lasts():
     assert not stiffness(result)
 
 
+@pytest.mark.slow
 def test_auto_takes_the_steps_of_radau(governor):
     """Every reporting time once, the digits of the reference, the steps of radau but for the start;
     the work done on the system goes on where it stood."""
@@ -88,6 +89,7 @@ def test_auto_and_penalty_only_say_so(governor):
     assert "then radau" not in note
 
 
+@pytest.mark.slow
 def test_an_event_after_the_change_is_found(governor):
     """The slider passes 0.6 m, long after radau has taken over; located on radau's own steps."""
     event = dap.Event("slider.r.z", above=0.6, action="stop")

@@ -116,6 +116,7 @@ def test_loose_tolerances_lose_no_turn(integrator, rtol):
     np.testing.assert_allclose(result.quantity("pin.angle").values, swung(result.t), atol=1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["standard", "joint"])
 @pytest.mark.parametrize("dt", [0.05, 2.5])
 def test_both_angles_of_a_universal_joint(method, dt):
@@ -185,6 +186,7 @@ def test_kinematics_of_a_driver_that_turns_back(dt):
     np.testing.assert_allclose(result.quantity("pin.angle").values, wanted, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["standard", "joint"])
 def test_sweeps_keep_turns_whatever_else_they_keep(method):
     points = {"bodies.wheel.w.z": np.array([-90.0, 20.0, 100.0, 333.0])}

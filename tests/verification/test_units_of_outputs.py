@@ -203,6 +203,7 @@ unit = "deg"
 """
 
 
+@pytest.mark.slow
 def test_a_declared_unit_is_everywhere(tmp_path, monkeypatch):
     """Table, JSON, NetCDF, MATLAB, data set, plot, sweep and saved scene have it, or none."""
     monkeypatch.chdir(tmp_path)

@@ -51,6 +51,7 @@ def compiled(scene, method=None):
     return CompiledModel(scene, method=method, registry=REGISTRY)
 
 
+@pytest.mark.slow
 @pytest.mark.thinned(2)
 @pytest.mark.parametrize("integrator", quickly(["dop853", "radau", "dopri5", "adams"], 2))
 @pytest.mark.parametrize("method", ["standard", "lsq"])
@@ -76,6 +77,7 @@ def test_the_reaction_holds_the_bead_on_the_wire():
     assert np.sum(force * tangents, axis=1) == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_periodic_unknowns_begin_again():
     """Round and round, s stays between its bounds, and the motion is the same."""
     result = dap.simulate(compiled(bead("on-curve-again", 6.0)), t_end=2.0, dt=0.1, **SETTINGS)
@@ -190,6 +192,7 @@ def resting():
     return scene
 
 
+@pytest.mark.slow
 def test_a_bead_comes_to_rest_where_its_wire_is_lowest():
     """Statics moves along the wire; a run from it begins with its unknown."""
     model = compiled(resting())

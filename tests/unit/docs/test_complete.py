@@ -299,6 +299,7 @@ def test_every_key_of_the_scene_file_is_there():
         assert f"`{key}`" in page, key
 
 
+@pytest.mark.slow
 def test_every_page_is_reached(source):
     """From the index, by lists of pages; models are listed by sphinx-gallery."""
     lists = {page: toctrees(page, text, source) for page, text in source.items()}

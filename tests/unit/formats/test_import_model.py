@@ -358,6 +358,7 @@ def test_friction_of_a_pair_is_that_of_the_one_with_priority(tmp_path):
     assert scene.materials[floor].with_[box]["mu"] == 0.2
 
 
+@pytest.mark.slow
 def test_a_box_of_a_file_slides_by_the_friction_of_its_pair(tmp_path):
     """mu = 0.4 of the box and 0.2 of the floor: it ends after v^2 / (2 mu g)."""
     scene, _ = imported(tmp_path, CONTACTS, contacts=True)

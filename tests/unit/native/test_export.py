@@ -356,6 +356,7 @@ RESISTING = partial(declared_ball, 0.5, mu_roll=0.02, mu_spin=0.005)
     (RESISTING, ["ball.rdd"], {"contact": "events", "integrator": "dop853"}),
     (lambda: dap.load("quadruped"), ["trunk.rdd", "front_left_hinge.i.force"], {}),
 ])  # fmt: skip
+@pytest.mark.slow
 def test_contacts_have_the_bits_of_simulate(tmp_path, make, more, settings):
     """Accelerations and loads of joints are means of the step here, too."""
     scene, t_end = make(), 0.3
@@ -370,6 +371,7 @@ def test_contacts_have_the_bits_of_simulate(tmp_path, make, more, settings):
     assert np.array_equal(np.array(rows), expected)
 
 
+@pytest.mark.slow
 def test_friction_masses_and_places_are_parameters_of_stepped_contacts(tmp_path):
     """A mass and inertias, of which steps have inverses, a place and a speed at the start."""
     names = ["materials.surface.mu", "bodies.ball.mass", "bodies.ball.Jp.y", "bodies.ball.r.z",

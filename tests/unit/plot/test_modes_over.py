@@ -40,6 +40,7 @@ def test_locus_is_a_circle_and_the_real_axis(found):
     np.testing.assert_allclose(z.real.min(), (-60.0 - np.sqrt(2000.0)) / 4.0, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_pairs_meet_on_the_axis(found):
     """The locus is without a gap: at critical damping both halves are at -10 1/s."""
     z, c = points_of(dap.plot(found, "eigenvalues"))

@@ -210,6 +210,7 @@ def test_path_without_turns_is_that_of_separate_searches(parameter, values):
         assert found.stable[k] == alone.stable
 
 
+@pytest.mark.slow
 def test_path_begins_where_a_start_leads():
     """The truss below its supports, from an equilibrium of another load."""
     below = truss(-50.0)

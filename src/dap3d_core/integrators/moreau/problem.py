@@ -53,8 +53,9 @@ LEAST_IMPULSE = 1e-3
 WEIGHT, MOST_WEIGHT = 1e5, 1e10
 #: Passes in which joints answer: what hardly moves must not be felt as if it gave.
 FELT = 2
-#: A round helps where it leaves less than this part of the residual, and asks for a larger weight
-#: where it leaves less than the next: what hardly moves is felt with that alone. Rounds at most.
+#: A round helps where it leaves less than this part of the residual. Where smaller weights lead to
+#: no solution, rounds that leave less than the next ask for a larger one: what hardly moves is felt
+#: with that alone. Rounds at most, of both.
 HELPS, SLOW, ROUNDS = 0.5, 0.95, 40
 #: Part of the tolerance to which a round is solved.
 INNER = 1e-2
@@ -295,7 +296,8 @@ def newton(s: StepArrays, tolerance: float, is_reduced: bool) -> float:
     most = MOST_WEIGHT if is_reduced else WEIGHT
     if is_reduced and left > tolerance:
         put_felt(s, FELT if tolerance < NEAR else 1)
-    for _ in range(ROUNDS):
+    raises = False
+    for _ in range(2 * ROUNDS):
         if left <= tolerance:
             break
         inner = INNER * max(0.1 * tolerance, min(left, 1e-3))
@@ -306,7 +308,7 @@ def newton(s: StepArrays, tolerance: float, is_reduced: bool) -> float:
             exchange(s)
         new = residual_after(s, is_reduced)
         helps = new <= HELPS * left
-        if helps or (new < SLOW * left):
+        if helps or (raises and new < SLOW * left):
             weight = min(weight / LESS, max(most, weight) if helps else MOST_WEIGHT)
         else:
             weight *= LESS
@@ -314,8 +316,12 @@ def newton(s: StepArrays, tolerance: float, is_reduced: bool) -> float:
             exchange(s)
             put_velocities(s, s.v)
         left = min(left, new)
-        if weight < LEAST or (left <= SETTLED and not helps and not is_reduced):
+        if left <= SETTLED and not helps and not is_reduced:
             break
+        if weight < LEAST:
+            if raises:
+                break
+            raises, weight = True, WEIGHT
     return left
 
 

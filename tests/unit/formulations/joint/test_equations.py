@@ -169,6 +169,7 @@ def test_stepping_says_that_it_keeps_body_coordinates():
         dap.simulate("pen1", t_end=0.1, dt=0.1, step=1e-3, method="joint", integrator="moreau")
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_a_stiff_tree_is_handed_over_to_radau():
     """Integrator auto goes on in joint coordinates."""

@@ -89,6 +89,7 @@ def sliding_rod():
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.every(2)
 @pytest.mark.parametrize("method", ["lsq", "joint"])
 def test_contacts_run_by_programs_of_their_modes(method, at_once):
@@ -108,6 +109,7 @@ def test_contacts_run_by_programs_of_their_modes(method, at_once):
     assert any({RHS, WATCH} <= found for found in made)
 
 
+@pytest.mark.slow
 @pytest.mark.every(2)
 @pytest.mark.parametrize("method", ["standard", "joint"])
 def test_derivatives_run_by_programs(method, at_once, monkeypatch):

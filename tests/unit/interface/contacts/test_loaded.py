@@ -25,6 +25,7 @@ def test_which_rows_hold_and_whether_the_load_only_pushes(grip):
     assert grip.is_friction_alone()
 
 
+@pytest.mark.slow
 @pytest.mark.every(3)
 @pytest.mark.parametrize("grip", GRIPS, ids=lambda grip: grip.__name__)
 def test_rows_and_forces_agree(grip):

@@ -39,6 +39,7 @@ def test_rates_and_outputs_along_a_direction_of_states(tmp_path, model, outputs)
     assert np.abs(found[len(rates) :]).max() > 0.0
 
 
+@pytest.mark.slow
 def test_a_cart_on_a_spring_has_the_derivatives_of_its_equation(tmp_path):
     """m r'' = f - k r - c v: all partial derivatives; the reaction of the track along x is none."""
     scene = _written(SPRING, tmp_path)

@@ -26,6 +26,7 @@ def elements_of(result, scene):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.every(5)
 @pytest.mark.parametrize("model", ["fourbar3", "quarter_car", "crane", "planetary", "A03"])
 def test_reactions_and_forces_are_those_of_a_result(tmp_path, model):

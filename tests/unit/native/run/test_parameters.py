@@ -54,6 +54,7 @@ def test_points_of_joints_move_the_start(tmp_path):
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_initial_velocities(tmp_path):
     scene = dap.Scene(name="stone")
     scene.add_body("stone", mass=2.0, Jp=(0.1, 0.2, 0.25), r=(0.0, 0.0, 1.0), w=(1.0, 2.0, 3.0),

@@ -10,6 +10,7 @@ import dap3d_core as dap
 from dap3d_core.native.run.prepared import PreparedRun
 
 
+@pytest.mark.slow
 @pytest.mark.every(6)
 @pytest.mark.parametrize(
     ("make", "settings"),
@@ -23,6 +24,7 @@ def test_jumps_have_the_bits_of_simulate(tmp_path, make, settings):
     assert differences(make(), tmp_path, 2.0, **settings)
 
 
+@pytest.mark.slow
 def test_what_touches_at_the_start_jumps_there_and_once(tmp_path):
     """At z = 0 with 1 m/s downwards and e = 0.8: 0.8 m/s upwards at once."""
     scene = bouncing()

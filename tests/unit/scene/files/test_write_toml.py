@@ -83,6 +83,7 @@ def test_even_a_scene_of_nonsense_is_written_without_loss(scene):
     assert bits(again) == bits(scene)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=50)
 @given(scenes())
 def test_a_scene_that_was_written_is_read_back_bit_for_bit_and_checked_alike(scene):

@@ -22,6 +22,7 @@ def stopped():
     return scene
 
 
+@pytest.mark.slow
 def test_path_passes_a_corner():
     """Where the stop is touched, at -10 N, the stiffness jumps to 2100 N/m."""
     found = dap.equilibrium_path(stopped(), "forces.load.f.z", "0:-40:9")

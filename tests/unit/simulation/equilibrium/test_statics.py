@@ -107,6 +107,7 @@ def held(keyword="test-held", **fields):
     return dap.compile(scene, registry=REGISTRY)
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_a_solid_has_its_slow_stiffness():
     """The damper has crept: x = z = m g / k_p; a run from there stays."""

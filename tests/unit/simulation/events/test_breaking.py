@@ -207,6 +207,7 @@ def test_what_does_not_know_that_joints_break_says_so(compiled, use, words):
         use(compiled)
 
 
+@pytest.mark.slow
 @pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("scene", "settings", "stops"),
@@ -235,6 +236,7 @@ def test_a_checkpoint_has_the_joints_that_have_ended(scene, settings, stops, tmp
         assert [(e.kind, e.t) for e in result.events] == [(e.kind, e.t) for e in whole.events]
 
 
+@pytest.mark.slow
 @pytest.mark.every(2)
 @pytest.mark.parametrize("settings", [{}, {"integrator": "moreau", "step": 5e-3}])
 def test_joints_end_in_a_run_step_by_step(compiled, settings):

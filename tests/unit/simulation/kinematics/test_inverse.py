@@ -68,6 +68,7 @@ def test_an_actuator_whose_input_is_zero_moves_nothing(scene, motion):
     np.testing.assert_allclose(2.0 * np.array(found), plain, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_actuation_is_stored(scene, motion, tmp_path):
     """The file gives the same numbers, also as a quantity."""
     result = dap.inverse(undriven(scene), motion, ["torque"], output=tmp_path / "a.nc")
@@ -193,6 +194,7 @@ def test_a_motion_that_leaves_a_freedom_open_is_refused(scene, motion):
         dap.inverse(scene, {n: v[:3] for n, v in crank_places(motion).items()})
 
 
+@pytest.mark.slow
 def test_what_is_to_be_given_is_named_once():
     """Two rods below a first one that is given, on a ball joint and a hinge: four positions."""
     scene = mixed_chain(3)

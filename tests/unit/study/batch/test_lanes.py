@@ -178,6 +178,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.every(7)
 @pytest.mark.parametrize("case", CASES)
 def test_points_of_all_kinds_have_the_bits_of_points_alone(case):

@@ -29,6 +29,7 @@ def pendulum():
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("scene", "names", "settings", "part"),

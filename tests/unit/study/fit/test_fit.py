@@ -236,6 +236,7 @@ def test_points_that_fail_shorten_the_way():
     assert (np.diff([cost for _, cost in seen]) <= 0.0).all()
 
 
+@pytest.mark.slow
 @compiled
 def test_a_ball_that_bounces():
     """Restitution and height from where it is, in closed form: derivatives through the bounce."""

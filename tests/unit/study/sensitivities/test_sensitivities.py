@@ -140,6 +140,7 @@ def test_the_values_of_a_control_history():
         assert s.final("mass.r.x")[k] == pytest.approx(alone, rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.every(2)
 @pytest.mark.parametrize("method", ["standard", "joint"])
 def test_a_stop_of_an_angle(method):
@@ -158,7 +159,12 @@ def test_a_stop_of_an_angle(method):
 
 @pytest.mark.every(3)
 @pytest.mark.parametrize(
-    "how", [{"method": "standard"}, {"method": "lsq"}, {"integrator": "radau"}]
+    "how",
+    [
+        {"method": "standard"},
+        {"method": "lsq"},
+        pytest.param({"integrator": "radau"}, marks=pytest.mark.slow),
+    ],
 )
 def test_a_start_that_a_parameter_takes_off_the_constraints(how):
     """Its derivatives are brought onto them as its values would be, whether it is corrected or not.

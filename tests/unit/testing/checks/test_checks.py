@@ -492,6 +492,7 @@ def test_a_report_has_all_that_is_needed_to_see_the_error_again():
     assert not report.ok
 
 
+@pytest.mark.slow
 def test_each_variant_is_checked_by_itself():
     """The words name the variant that is wrong; the others are right."""
     report = check_type(OneVariantWrong, poses=1)

@@ -45,6 +45,7 @@ class ByHand(OnCurve):
         return add(turning, own)
 
 
+@pytest.mark.slow
 def test_formulas_by_hand_pass():
     assert not failures(ByHand)
 

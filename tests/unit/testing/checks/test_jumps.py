@@ -111,6 +111,7 @@ class Branches(PlaneStop):
         return -(1.0 + e) * Jv if Jv < 0.0 else 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.every(5)
 @pytest.mark.parametrize(
     ("type_", "failing", "words"),
