@@ -53,9 +53,9 @@ LEAST_IMPULSE = 1e-3
 WEIGHT, MOST_WEIGHT = 1e5, 1e10
 #: Passes in which joints answer: what hardly moves must not be felt as if it gave.
 FELT = 2
-#: A round helps where it leaves less than this part of the residual. Where smaller weights lead to
-#: no solution, rounds that leave less than the next ask for a larger one: what hardly moves is felt
-#: with that alone. Rounds at most, of both.
+#: A round helps where it leaves less than this part of the residual. Where nothing else has led to a
+#: solution, rounds that leave less than the next ask for a larger weight: what hardly moves is felt
+#: with that alone. Rounds at most.
 HELPS, SLOW, ROUNDS = 0.5, 0.95, 40
 #: Part of the tolerance to which a round is solved.
 INNER = 1e-2
@@ -166,6 +166,8 @@ def solve(s: StepArrays, tolerance: float) -> bool:
             s.residual = newton(s, aim, False)
         if few and joined and s.residual > tolerance and not refine_held(s, tolerance, aim):
             return False
+        if joined and s.residual > tolerance:
+            s.residual = newton(s, aim, False, True)
     if s.carries == 0 and judge(s) > tolerance and not joined:
         sweep(s, SWEEPS, max(tolerance, NEAR), RELAX)
         if not finish(s, tolerance):
@@ -282,10 +284,11 @@ def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
 
 
 @compiled
-def newton(s: StepArrays, tolerance: float, is_reduced: bool) -> float:
+def newton(s: StepArrays, tolerance: float, is_reduced: bool, raises: bool = False) -> float:
     """Improve the impulses x and y of a group; the residual.
 
-    is_reduced: by the problem of contacts alone, by what ``factor_joints`` has left.
+    is_reduced: by the problem of contacts alone, by what ``factor_joints`` has left. raises: rounds
+    that help little ask for a larger weight.
     """
     if is_reduced:
         meet_joints(s)
@@ -296,8 +299,7 @@ def newton(s: StepArrays, tolerance: float, is_reduced: bool) -> float:
     most = MOST_WEIGHT if is_reduced else WEIGHT
     if is_reduced and left > tolerance:
         put_felt(s, FELT if tolerance < NEAR else 1)
-    raises = False
-    for _ in range(2 * ROUNDS):
+    for _ in range(ROUNDS):
         if left <= tolerance:
             break
         inner = INNER * max(0.1 * tolerance, min(left, 1e-3))
@@ -316,12 +318,8 @@ def newton(s: StepArrays, tolerance: float, is_reduced: bool) -> float:
             exchange(s)
             put_velocities(s, s.v)
         left = min(left, new)
-        if left <= SETTLED and not helps and not is_reduced:
+        if weight < LEAST or (left <= SETTLED and not helps and not is_reduced):
             break
-        if weight < LEAST:
-            if raises:
-                break
-            raises, weight = True, WEIGHT
     return left
 
 
