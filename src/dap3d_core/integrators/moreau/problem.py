@@ -53,9 +53,9 @@ LEAST_IMPULSE = 1e-3
 WEIGHT, MOST_WEIGHT = 1e5, 1e10
 #: Passes in which joints answer: what hardly moves must not be felt as if it gave.
 FELT = 2
-#: A round helps where it leaves less than this part of the residual. Where nothing else has led to a
-#: solution, rounds that leave less than the next ask for a larger weight: what hardly moves is felt
-#: with that alone. Rounds at most.
+#: A round helps where it leaves less than this part of the residual. Where nothing else has led to
+#: a solution, rounds that leave less than the next ask for a larger weight: what hardly moves is
+#: felt with that alone. Rounds at most.
 HELPS, SLOW, ROUNDS = 0.5, 0.95, 40
 #: Part of the tolerance to which a round is solved.
 INNER = 1e-2
