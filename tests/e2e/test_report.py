@@ -43,7 +43,7 @@ def test_tables_fit_the_width(dap3d):
 
 @pytest.mark.slow
 def test_a_signal_keeps_what_was_measured(dap3d):
-    process = dap3d.start("report", "pen1", *QUICK, "--repeat", "200", "--method", "standard",
+    process = dap3d.start("report", "pen1", *QUICK, "--repeat", "1000", "--method", "standard",
                           "--csv", "a.csv")  # fmt: skip
     for line in process.stderr:  # until all runs of the first tolerance are measured
         if re.match(r"\w+, \w+, rtol 1e-(0[4-9]|1)", line):
