@@ -88,6 +88,8 @@ class ContactJumps(Jumps):
         self.repeats = False
         self._stood = (0, -np.inf)
         self._latest: deque[tuple[float, str]] = deque(maxlen=MOST_CHANGES)
+        #: largest energy, J, that Newton's law has given in an instant; the instant, and contacts
+        self._gain: tuple[float, float, str] = (0.0, 0.0, "")
 
     @cached_property
     def arrays(self) -> ContactArrays:
@@ -212,11 +214,19 @@ class ContactJumps(Jumps):
         )
 
     def notes(self, integration: Integration) -> list[str]:
-        """A note where more happened than is kept."""
-        if self.count <= MOST_RECORDS:
-            return []
-        words = f"contacts changed {self.count} times; the first {MOST_RECORDS} changes are kept"
-        return [information(words)]
+        """Notes where impacts gave energy, and where more happened than is kept."""
+        found: list[str] = []
+        gain, t, names = self._gain
+        if gain > 0.0:
+            found.append(
+                f"an impact at t = {t:.9g} s gave {gain:.3g} J, the most of this run ({names}): "
+                "Newton's law does so beside friction and beside other laws or e; "
+                'law = "poisson" of all that strikes at once does not'
+            )
+        if self.count > MOST_RECORDS:
+            words = f"contacts changed {self.count} times; the first {MOST_RECORDS} changes are"
+            found.append(information(f"{words} kept"))
+        return found
 
     def set_state(
         self,
@@ -294,10 +304,13 @@ class ContactJumps(Jumps):
         if failure := decide(*given, evaluator.functions, table.tensions):
             self._refuse(t, failure)
         s.jammed = -1
-        self.lose |= abs(float(np.sum(s.work))) > LOSSLESS * s.exchanged
-        self._take_decided(integration, float(np.sum(s.work)))
+        work, struck = float(np.sum(s.work)), np.flatnonzero(np.abs(s.impulses[:, 0]) > 0.0)
+        self.lose |= abs(work) > LOSSLESS * s.exchanged
+        if work > max(LOSSLESS * s.exchanged, self._gain[0]) and np.any(s.newton[struck]):
+            self._gain = (work, t, ", ".join(table.names[c] for c in struck))
+        self._take_decided(integration, work)
         after = self._after(u)
-        for c in np.flatnonzero(np.abs(s.impulses[:, 0]) > 0.0).tolist():
+        for c in struck.tolist():
             self._note(c, t, "impact", u, after, float(s.work[c]))
         for c in np.flatnonzero(s.rests_soon).tolist():
             self._note(c, t + float(s.rest_time[c]), "rest")

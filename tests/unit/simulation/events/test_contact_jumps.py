@@ -173,6 +173,25 @@ def test_newtons_law_reverses_the_normal_velocity():
     assert impact.u_after[9] == pytest.approx(-0.5 * impact.u[9], rel=1e-12)
 
 
+def test_an_impact_that_gives_energy_is_told():
+    """A rod that strikes with its tip: Newton's law with friction (Kane and Levinson, 1985)."""
+    found = {}
+    for law in ("newton", "poisson"):
+        scene, half = dap.Scene(name="rod"), 0.3
+        scene.add_body("rod", mass=1.0, Jp=[0.1, 0.1, 0.01], r=[0.0, 0.0, 0.5 * np.cos(0.6)],
+                       p=[np.cos(half), 0.0, np.sin(half), 0.0],
+                       r_dot=[0.5, 0.0, -1.0])  # fmt: skip
+        scene.add_point("tip", "rod", [0.0, 0.0, -0.5])
+        scene.add_contact("ball_plane", "floor", P_i="tip", mu=0.3, e=0.9, law=law)
+        found[law] = dap.simulate(scene, t_end=0.1, dt=0.1)
+        kinetic = found[law].energy.kinetic
+        assert kinetic[-1] == pytest.approx(0.5 * (0.25 + 1.0) + found[law].events[0].work)
+    assert found["newton"].events[0].work > 0.01
+    assert any("gave 0.02" in note and "(floor)" in note for note in found["newton"].notes)
+    assert found["poisson"].events[0].work < 0.0
+    assert not any("gave" in note for note in found["poisson"].notes)
+
+
 def wedged(law):
     """A rod on a pin, whose tip strikes the floor so steeply that friction holds it there."""
     scene, angle = dap.Scene(name="wedged"), 0.7
