@@ -4,7 +4,7 @@ They are programs of the scene (scene_program.py), widened (kernels/compiler/lan
 guard fails, the results of that lane are not valid, which ``bound`` says.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext, suppress
 from functools import partial
 from typing import Any
@@ -92,22 +92,14 @@ def write_wide(
     return "\n".join([*tracer.needs.values(), text])
 
 
-def _write_some(
-    evaluator: Evaluator,
-    k: int,
-    time: float,
-    state: Floats,
-    others: Sequence[Floats],
-    symbol: str,
-    varied: Varied,
-) -> str:
-    """As ``write_wide``; without the ways of the others where all were too long."""
+def _write_some(write: Callable[..., str], others: Sequence[Floats], symbol: str) -> str:
+    """A program with the ways of other states; without them where all are too long."""
     try:
-        return write_wide(evaluator, k, time, state, others, symbol, varied)
+        return write(others, symbol)
     except TraceError:
-        if k != PROJECT or not others:
+        if not others:
             raise
-        return write_wide(evaluator, k, time, state, (), symbol, varied)
+        return write((), symbol)
 
 
 def program_rates(
@@ -135,7 +127,8 @@ def program_rates(
 
     functions = {}
     for k in programmed(evaluator):
-        write = partial(_write_some, evaluator, k, time, state, others, varied=varied)
+        ways = partial(write_wide, evaluator, k, time, state, varied=varied)
+        write = partial(_write_some, ways, others if k == PROJECT else ())
         with nullcontext() if k == RHS else suppress(CompileError, TraceError):
             unit = wide_unit(f"{name}-{k}x{count}", count, write, optimise=False)
             functions[k] = Entry(unit, 0, SIGNATURE)
