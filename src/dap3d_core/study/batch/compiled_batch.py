@@ -156,7 +156,8 @@ class CompiledBatch:
             found: LaneBatch | str = reason_against(self.evaluator, self._place[1].size)
             if not found:
                 varied = varied_at(self.evaluator.system, self._varied)
-                states = self._states_of_run(self.points(*point))
+                projects = self.integration.work.projects != 0
+                states = self._states_of_run(self.points(*point)) if projects else []
                 wide = wide_rates(self.evaluator, *self._place, varied, states)
                 found = (
                     wide
