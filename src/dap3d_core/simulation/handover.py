@@ -47,13 +47,12 @@ def hand_over(run: RunState) -> bool:
     before such a pose, once. Of slow slip it is the other way round.
     """
     present, settings, left = run.present, run.settings, np.inf
-    if _leaves_slip(run):
-        pass
-    elif present.status in (Status.STIFF, Status.RUNNING):
+    slips = _leaves_slip(run)
+    if not slips and present.status in (Status.STIFF, Status.RUNNING):
         run.until = np.inf
         if present.status is Status.RUNNING:
             present.work.status = Status.FINISHED
-    else:
+    elif not slips:
         left = _left(run)
         has_just_begun = len(run.integrations) > 1 and run.integrations[0].t >= present.t
         if left == np.inf or has_just_begun or settings.step or not settings.project:
