@@ -146,20 +146,3 @@ def test_a_start_below_the_tolerance_does_not_hide_its_error():
                           estimate_error=True)  # fmt: skip
     error = abs(result.r[-1, 0, 0] - 0.5 * np.sin(exact.y[0, -1]))
     assert 0.1 * error <= result.error.r[-1, 0, 0] <= 100.0 * error
-
-
-@pytest.mark.slow
-def test_chaos_is_told_and_errors_are_measured_up_to_there():
-    """A chain of three rods from the horizontal: two runs at 1e-13 part before 30 s.
-    It loses four digits in 5 s (benchmarks.md 3), so that 1e-13 grows to 1e-3 after some 13 s or
-    more: neighbours part at that rate only while they are close to each other."""
-    found = dap.report(
-        problems.chain(3), quick=True, t_end=30.0, dt=0.1, methods=["standard"],
-        integrators=["dop853"],
-    )  # fmt: skip
-    reference = found.reference
-    assert 5.0 < reference.meaningless_from < 30.0
-    assert reference.t[-1] == pytest.approx(reference.meaningless_from - 0.1, abs=1e-9)
-    assert len(reference.t) == len(reference.u)
-    assert any("chaos" in note for note in reference.notes)
-    assert any("shorter final time" in note for note in found.notes)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.rotations import rotation
+from support.stewart import stewart
 
 import dap3d_core as dap
 
@@ -19,6 +20,46 @@ class Body:
         inertia = self.A @ np.diag(J) @ self.A.T
         self.force = mass * (result.rdd[k, b] - GRAVITY)  # what all but the weight gives
         self.moment = inertia @ result.wd[k, b] + np.cross(w, inertia @ w)
+
+
+def test_driven_legs_of_a_stewart_platform_bear_what_newton_and_euler_say():
+    """Thirteen bodies: each leg as a beam about its foot, then six equations of the platform.
+    1e-10 of the largest force: rounding times the condition of the equations, some hundred."""
+    scene = stewart(50.0, 2.0, 100.0, spins=False)
+    result = dap.kinematics(scene, t_end=0.5, dt=0.1)
+    heads = {k: np.array(scene.points[f"head{k}"].sPp) for k in range(6)}
+    feet = {k: np.array(scene.points[f"foot{k}"].sPp) for k in range(6)}
+    top_mass, top_J = scene.bodies["top"].mass, scene.bodies["top"].Jp
+    push = np.array(scene.forces["push"].fields["f"])
+    found = np.zeros((len(result.t), 6))
+    expected = np.zeros_like(found)
+    for instant in range(len(result.t)):
+        top = Body(result, "top", instant, top_mass, top_J)
+        sides, lines = [top.force - push, top.moment], []
+        axial, shears = [], []
+        for k in range(6):
+            low, up = (Body(result, f"{part}{k}", instant, 2.0, scene.bodies[f"{part}{k}"].Jp)
+                       for part in ("low", "up"))  # fmt: skip
+            arm = top.A @ heads[k]
+            leg = top.r + arm - feet[k]
+            length = np.linalg.norm(leg)
+            s = leg / length
+            M = sum(np.cross(b.r - feet[k], b.force) + b.moment for b in (low, up))
+            cross = np.cross(low.A[:, 1], scene.vectors[f"cross{k}"].sp)
+            M = M - cross * (M @ s) / (cross @ s)  # the moment that keeps the leg from spinning
+            shear = np.cross(M, s) / length  # of the force of the platform on the leg
+            sides[0] = sides[0] + shear
+            sides[1] = sides[1] + np.cross(arm, shear)
+            lines.append(-np.concatenate([s, np.cross(arm, s)]))
+            axial.append((up.force @ s, s))
+            shears.append(shear)
+        x = np.linalg.solve(np.array(lines).T, np.concatenate(sides))
+        for k in range(6):
+            need, s = axial[k]
+            expected[instant, k] = need - x[k]
+            found[instant, k] = result.reaction(f"D{k}")["i"].force[instant] @ s
+    assert np.max(np.abs(expected)) > 100.0
+    assert np.max(np.abs(found - expected)) < 1e-10 * np.max(np.abs(expected))
 
 
 def platform_on_lines(number, *, spring):

@@ -4,15 +4,12 @@ import numpy as np
 import pytest
 from support import mechanisms, problems, redundant
 from support.internals import Evaluator, correct_initial
-from support.own_types import registry_of
-from support.plain import in_another_process, long_in_plain_python
+from support.plain import in_another_process
 from support.process import run
 from support.rotations import rotation
 
 import dap3d_core as dap
 from dap3d_core.formulations import PROJECT, RHS
-from dap3d_core.interface import Joint, Point, Vector, number, point, vector
-from dap3d_core.kernels import cross, dot, eye, hstack, neg, normals, row, scale, skew, sub
 from dap3d_core.model import build_model
 from dap3d_core.scene import check
 
@@ -124,56 +121,6 @@ def test_lsq_and_standard_agree_where_rows_are_independent(name):
     u = moving(standard)
     for one, other in zip(report_of(standard, u), report_of(lsq, u), strict=True):
         assert other == pytest.approx(one, abs=1e-11 * np.max(np.abs(one)))
-
-
-class Sized(Joint):
-    """A revolute joint whose rows are all multiplied by ``size``."""
-
-    keyword, rows = "sized", 5
-    P_i: Point = point()
-    P_j: Point = point()
-    a_i: Vector = vector()
-    a_j: Vector = vector()
-    size: float = number(default=1.0)
-
-    def prepare(self, bodies):
-        n, m = normals(self.a_j)
-        return {"n_j": n, "m_j": m}
-
-    def C(r_P_i, r_P_j, a_i, n_j, m_j, size):
-        return (*scale(size, sub(r_P_j, r_P_i)), size * dot(a_i, n_j), size * dot(a_i, m_j))
-
-    def J(s_P_i, s_P_j, a_i, n_j, m_j, size):
-        n, m, none = scale(size, cross(a_i, n_j)), scale(size, cross(a_i, m_j)), (0.0, 0.0, 0.0)
-        return (
-            (*hstack(eye(-size), skew(scale(size, s_P_i))), row(none, n), row(none, m)),
-            (*hstack(eye(size), skew(scale(-size, s_P_j))), row(none, neg(n)), row(none, neg(m))),
-        )
-
-    def gamma(s_P_i, s_P_j, a_i, n_j, m_j, a_i_dot, n_j_dot, m_j_dot, w_i, w_j, size):
-        w = sub(w_j, w_i)
-        points = sub(cross(w_i, cross(w_i, s_P_i)), cross(w_j, cross(w_j, s_P_j)))
-        n = dot(cross(a_i_dot, n_j), w) + dot(cross(a_i, n_j_dot), w)
-        m = dot(cross(a_i_dot, m_j), w) + dot(cross(a_i, m_j_dot), w)
-        return (*scale(size, points), size * n, size * m)
-
-
-@long_in_plain_python
-@pytest.mark.parametrize("size", [1e6, 1e-6])
-def test_the_motion_does_not_depend_on_the_size_of_rows(size):
-    """lsq, a door on two hinges of which one has its rows multiplied: the same swing after 2 s, to
-    the 1e-10 that rounding of rows of 1e6 may come to; and the same start, to rounding."""
-    registry, found = registry_of(Sized), {}
-    for factor in (1.0, size):
-        scene = redundant.hinged_door()
-        hinge = scene.joints.pop("H1").fields
-        scene.add_joint("sized", "H1", size=factor, **hinge)
-        compiled = dap.compile(scene, method="lsq", registry=registry)
-        found[factor] = dap.simulate(compiled, t_end=2.0, dt=0.5, rtol=1e-9)
-    plain, sized = found[1.0], found[size]
-    assert abs(plain.r[-1, 0, 1] + 0.5) > 0.1  # it has swung
-    assert sized.r == pytest.approx(plain.r, abs=1e-10)
-    assert sized.rdd[0] == pytest.approx(plain.rdd[0], abs=1e-12)
 
 
 def test_auto_takes_lsq_where_rows_are_redundant():
