@@ -1,48 +1,17 @@
-"""A four-bar linkage and a Stewart platform, as examples of closed chains.
-Each is a function that returns its motion in minimal coordinates and its joints, in global axes."""
+"""A Stewart platform as a file would say it: its joints, and its motion in minimal coordinates."""
 
 import numpy as np
 
-from support.minimal_motion import Body, MinimalMotion, cross, meeting, rod_axes, turned, unit
+from support.minimal_motion import Body, MinimalMotion, cross, rod_axes, turned, unit
 from support.model_files import Link
 
 X, Y, Z = np.eye(3)
-
-
-def along(a, b, normal=Y):
-    """The pose of a planar rod from a to b, with its origin in the middle."""
-    d = unit(b - a)
-    return 0.5 * (a + b), np.stack([d, normal + 0 * d, cross(d, normal)], axis=1)
 
 
 def rod(mass, length):
     """A rod along x."""
     J = mass * length**2 / 12.0
     return Body(mass, (0.02 * J, J, 1.01 * J))
-
-
-def four_bar():
-    """A crank of 0.3 m that turns a rocker of 0.6 m."""
-    A, D = np.zeros(3), np.array([0.9, 0.0, 0.1])
-    bodies = {"crank": rod(0.8, 0.3), "coupler": rod(1.5, 0.8), "rocker": rod(1.1, 0.6)}
-
-    def points(s):
-        B = 0.3 * (np.cos(s[0]) * X + np.sin(s[0]) * Z)
-        return B, meeting(B, 0.8, D, 0.6, -Y)
-
-    def poses(s):
-        B, C = points(s)
-        return {"crank": along(A, B), "coupler": along(B, C), "rocker": along(D, C)}
-
-    start = np.array([0.9])
-    B, C = points(start)
-    joints = {
-        "a": Link("revolute", "world", "crank", tuple(A), (Y,)),
-        "b": Link("revolute", "crank", "coupler", tuple(B), (Y,)),
-        "d": Link("revolute", "world", "rocker", tuple(D), (Y,)),
-        "c": Link("revolute", "coupler", "rocker", tuple(C), (Y,), closes=True),
-    }
-    return MinimalMotion(bodies, poses, start), joints
 
 
 def stewart():
@@ -86,6 +55,3 @@ def stewart():
     for i in range(6):
         joints[f"head{i}"] = Link("ball", f"up{i}", "top", tuple(o + A @ heads[i]), closes=True)
     return MinimalMotion(bodies, poses, start, [(400.0, 4.0)] * 6, lengths), joints
-
-
-CHAINS = {"four-bar": four_bar, "stewart": stewart}

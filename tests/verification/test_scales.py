@@ -10,30 +10,24 @@ import dap3d_core as dap
 GRAVITY = 9.81
 
 
-def parallelogram(length, time=1.0, at=(0.0, 0.0, 0.0)):
-    """A hinged parallelogram of links of one ``length``, whose unit of time is ``time``."""
-    half = 0.5 * length
-    scene = dap.Scene(name="parallelogram")
-    inertia = [length**2 / 600.0, length**2 / 12.0, length**2 / 12.0]
-    speed, p = length / time, [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]
-    for name, x in (("left", 0.0), ("right", length)):
-        scene.add_body(name, mass=1.0, Jp=inertia, r=np.add(at, [x, half, 0.0]).tolist(), p=p,
-                       r_dot=[0.5 * speed, 0.0, 0.0], w=[0.0, 0.0, -1.0 / time])  # fmt: skip
-    scene.add_body("coupler", mass=1.0, Jp=inertia, r=np.add(at, [half, length, 0.0]).tolist(),
-                   r_dot=[speed, 0.0, 0.0])  # fmt: skip
-    for name in ("left", "right", "coupler"):
-        for end, x in (("P", -half), ("Q", half)):
-            scene.add_point(f"{name}_{end}", body=name, sPp=[x, 0.0, 0.0])
-    for name, x in (("left", 0.0), ("right", length)):
-        scene.add_point(f"foot_{name}", body="ground", sPp=np.add(at, [x, 0.0, 0.0]).tolist())
-        scene.add_joint("rev", f"pin_{name}", P_i=f"{name}_P", P_j=f"foot_{name}", a_i=f"{name}.z",
-                        a_j="ground.z")  # fmt: skip
-    for name, end in (("left", "P"), ("right", "Q")):
-        scene.add_joint("rev", f"top_{name}", P_i=f"{name}_Q", P_j=f"coupler_{end}",
-                        a_i=f"{name}.z", a_j="coupler.z")  # fmt: skip
-    gravity = GRAVITY * length / time**2
-    scene.add_force("weight", "weight", gravity=gravity, wgt=[0.0, -1.0, 0.0])
+def enlarged(scene, length, time=1.0, at=(0.0, 0.0, 0.0)):
+    """The same bodies, points and weight in units of such a length and time, at another place."""
+    for body in scene.bodies.values():
+        body.r = tuple(length * np.asarray(body.r) + at)
+        body.Jp = tuple(length**2 * np.asarray(body.Jp))
+        body.r_dot = tuple(length / time * np.asarray(body.r_dot))
+        body.w = tuple(np.asarray(body.w) / time)
+    for point in scene.points.values():
+        away = at if point.body == "ground" else 0.0
+        point.sPp = tuple(length * np.asarray(point.sPp) + away)
+    for force in scene.forces.values():
+        force.fields = {**force.fields, "gravity": length / time**2 * GRAVITY}
     return scene
+
+
+def parallelogram(*scale, **place):
+    """A hinged parallelogram of links of one length."""
+    return enlarged(redundant.four_bars(1), *scale, **place)
 
 
 @pytest.fixture(scope="module")
@@ -225,20 +219,8 @@ def test_a_scene_at_rest_never_loses_its_meaning():
     assert result.error.meaningless_from is None
 
 
-def enlarged(scene, length):
-    """The same bodies, points and weight, all lengths so many times as large."""
-    for body in scene.bodies.values():
-        body.r = tuple(length * np.asarray(body.r))
-        body.Jp = tuple(length**2 * np.asarray(body.Jp))
-    for point in scene.points.values():
-        point.sPp = tuple(length * np.asarray(point.sPp))
-    for force in scene.forces.values():
-        force.fields = {**force.fields, "gravity": length * GRAVITY}
-    return scene
-
-
 @pytest.mark.parametrize("length", [1e-3, 1e3, 1e-6])
-@pytest.mark.parametrize("linkage", [redundant.bricard, redundant.bennett])
+@pytest.mark.parametrize("linkage", [lambda: dap.load("A04"), redundant.bennett])
 def test_linkages_of_one_freedom_that_no_count_tells_have_it_in_any_units(linkage, length):
     """Rank, freedom, shared rows, no joint that binds; the motion to what rtol allows."""
     ours, theirs = (dap.compile(enlarged(linkage(), size)) for size in (length, 1.0))

@@ -25,18 +25,6 @@ def test_errors_follow_the_tolerances():
     assert errors[ladder[-1]] < errors[ladder[0]] / 100.0
 
 
-def test_turns_are_counted():
-    """What is watched at accepted steps is watched here, too: a torsion spring over two turns."""
-    scene = dap.Scene(name="torsion")
-    scene.add_body("wheel", mass=1.0, Jp=(0.1, 0.1, 0.1), w=(0.0, 0.0, 15.0))
-    scene.add_joint("rev", "pin", P_i="wheel.O", P_j="ground.O", a_i="wheel.z", a_j="ground.z")
-    axes = {"v_i": "wheel.x", "v_j": "ground.x", "axis": "ground.z"}
-    scene.add_force("rot_sda", "spring", k=0.4, turns=True, **axes)
-    result = dap.simulate(scene, t_end=1.0, dt=0.1, integrator="adams", rtol=1e-10, atol=1e-10)
-    assert 2 * np.pi < 15.0 / 2.0  # amplitude of the swing: more than a turn
-    assert np.abs(result.w[:, 0, 2] - 15.0 * np.cos(2.0 * result.t)).max() < 1e-7
-
-
 def test_what_does_not_fit_is_refused():
     scene = problems.pendulum()
     with pytest.raises(dap.SimulationError, match="adams does not fit method penalty"):
