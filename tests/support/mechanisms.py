@@ -100,3 +100,55 @@ def bent_chain(n):
             scene.add_joint("rev", f"J{k}", P_i=inner, P_j=outer, a_i=f"{name}.y", a_j=axis)
         outer, axis = scene.add_point(f"out{k}", name, (0.5, 0.0, 0.0)), f"{name}.y"
     return scene
+
+
+def four_bar_row(count, angle=0.0):
+    """IFToMM A02: ``count`` parallelograms side by side on revolutes; cranks turned by an angle.
+    Cranks upright at angle 0; at 90 degrees all links are in line."""
+    scene = dap.Scene(name=f"{count} four-bars")
+    along = np.array([-np.sin(angle), np.cos(angle), 0.0])
+    p = (np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2))
+    for k in range(count + 1):
+        crank, r = f"crank{k}", np.array([k, 0.0, 0.0])
+        scene.add_body(crank, mass=1.0, Jp=(1 / 12, 1e-3, 1 / 12), r=r + along / 2, p=p)
+        scene.add_point(f"A{k}", crank, (0.0, -0.5, 0.0))
+        scene.add_point(f"B{k}", crank, (0.0, 0.5, 0.0))
+        scene.add_point(f"post{k}", "ground", r)
+    for k in range(1, count + 1):
+        coupler = f"coupler{k}"
+        r = np.array([k - 0.5, 0.0, 0.0])
+        scene.add_body(coupler, mass=1.0, Jp=(1e-3, 1 / 12, 1 / 12), r=r + along)
+        scene.add_point(f"L{k}", coupler, (-0.5, 0.0, 0.0))
+        scene.add_point(f"R{k}", coupler, (0.5, 0.0, 0.0))
+    ends = [(f"A{k}", f"post{k}") for k in range(count + 1)]
+    ends += [(f"{side}{k}", f"B{k - (side == 'L')}") for k in range(1, count + 1) for side in "LR"]
+    for i, j in ends:
+        a_i, a_j = (f"{scene.points[P].body}.z" for P in (i, j))
+        scene.add_joint("rev", f"J{i}", P_i=i, P_j=j, a_i=a_i, a_j=a_j)
+    return scene
+
+
+def bricard():
+    """IFToMM A04: five rods on six revolutes along the edges of a cube, closed by ground."""
+    corners = np.array(
+        [(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0, 0, 1)], dtype=float
+    )
+    scene = dap.Scene(name="Bricard")
+    for k in range(5):
+        centre = corners[k : k + 2].mean(axis=0)
+        scene.add_body(f"rod{k}", mass=1.0, Jp=(0.08, 0.08, 0.08), r=centre)
+        scene.add_point(f"start{k}", f"rod{k}", corners[k] - centre)
+        scene.add_point(f"end{k}", f"rod{k}", corners[k + 1] - centre)
+    scene.add_point("last", "ground", corners[5])
+    inner = [
+        ("ground.O", "ground"),
+        *((f"end{k}", f"rod{k}") for k in range(4)),
+        ("last", "ground"),
+    ]
+    outer = [*((f"start{k}", f"rod{k}") for k in range(5)), ("end4", "rod4")]
+    for k, ((i, body_i), (j, body_j)) in enumerate(zip(outer, inner, strict=True)):
+        axis = "yzxyzx"[k]
+        scene.add_joint(
+            "rev", f"J{k}", P_i=i, P_j=j, a_i=f"{body_i}.{axis}", a_j=f"{body_j}.{axis}"
+        )
+    return scene
