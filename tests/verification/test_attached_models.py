@@ -256,7 +256,7 @@ def test_attached_models_have_a_bound(tmp_path):
 
 
 def test_each_attached_file_is_read_once(tmp_path, monkeypatch):
-    """Files that attach the next one twice: one of 2^24 elements is refused where its bound is reached."""
+    """Files that attach the next one twice: one of 2^24 elements is refused at the bound."""
     monkeypatch.setattr(copies, "MOST_COPIES", 2000)
     read, include = [], SourceFiles.include
     monkeypatch.setattr(SourceFiles, "include", lambda self, name, *more: (
