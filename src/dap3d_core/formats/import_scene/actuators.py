@@ -332,7 +332,7 @@ def _add_slider(
     more = {"points": (*fields["points"], "ground.O", f"{slider}.O"),
             "divisors": (*(tendon.divisors or (1.0,) * len(links))[: len(tendon.points) - 1],
                          0.0, -1.0, 1.0)}  # fmt: skip
-    scene.add_joint("tendon", name, **(fields | more))
+    scene.add_joint("tendon", name, **{**fields, **more})
 
 
 def _level(gravity: Sequence[float]) -> Floats:
@@ -394,7 +394,7 @@ def _turn_by_sum(
         speed = coef / scale * (*moving[k - 1][0].rate, 0.0)[0]
         rate += speed
         own = (size[0], whole) if count == 1 else size
-        add_wheel(builder, wheel, *own, speed)
+        add_wheel(builder, wheel, own[0], own[1], speed)
         builder.scene.add_joint(
             "follow", names.free("joints", f"{wheel}_follows"), body_i=mover, a_j=axis,
             a_k=f"{wheel}.z", ratio=scale / coef, along=True if slides else None,
@@ -406,7 +406,7 @@ def _turn_by_sum(
         if k < count or whole:
             total = names.free("bodies", f"{tendon.name}_sum{k}")
             own = (size[0], whole) if k == count else size
-            add_wheel(builder, total, *own, rate)
+            add_wheel(builder, total, own[0], own[1], rate)
         builder.scene.add_joint(
             "follow", names.free("joints", f"{tendon.name}_sum{k}"), body_i=total,
             a_j=f"{before}.z", a_k=f"{wheel}.z",

@@ -62,7 +62,7 @@ FELT = 2
 #: A round helps where it leaves less than this part of the residual. Where nothing else has led to
 #: a solution, rounds that leave less than the next ask for a larger weight: what hardly moves is
 #: felt with that alone. Rounds at most.
-HELPS, SLOW, ROUNDS = 0.5, 0.95, 40
+HELPS, SLOW, ROUNDS = 0.5, 0.999, 40
 #: Part of the tolerance to which a round is solved.
 INNER = 1e-2
 #: A residual from which a round that does not help is the last.
