@@ -220,10 +220,14 @@ def compare_contacts(path, root):
 def largest_difference(oracle, scene, result, found):
     """The largest difference of accelerations found, relative to the largest or 1."""
     places, pairs = {name: k for k, name in enumerate(scene.bodies)}, []
+    left = dict.fromkeys(places.values())
     for name, (com, a) in oracle.accelerations():
-        apart = np.abs(result.r[0] - com).max(axis=1)  # of one without a name the nearest
-        if name in places or apart.min() < NEAR:
-            pairs.append((found[places.get(name, int(np.argmin(apart)))], a))
+        apart = np.abs(result.r[0] - com).max(axis=1)
+        # of one without a name the nearest; of several in one place the next, as in the file
+        place = places.get(name, min(left, key=lambda k: round(apart[k] / NEAR, 6), default=None))
+        if name in places or (place is not None and apart[place] < NEAR):
+            left.pop(place, None)
+            pairs.append((found[place], a))
     if not pairs:
         raise PeerError("no body that both have")
     largest = max(1.0, *(np.abs(a).max() for _, a in pairs))

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import dap3d_core as dap
+from dap3d_core.formats.import_scene.source_files import SourceFiles
+from dap3d_formats.mjcf import copies
 
 #: In degrees with angles about x, y, z; the classes and meshes of each file are its own.
 TOP = """<mujoco model="top"><asset><model name="arm" file="parts/arm.xml"/>
@@ -251,6 +253,21 @@ def test_attached_models_have_a_bound(tmp_path):
           </asset><worldbody>{text}</worldbody></mujoco>""")
     with pytest.raises(dap.SceneError, match="more than"):
         dap.import_model(tmp_path / "0.xml")
+
+
+def test_each_attached_file_is_read_once(tmp_path, monkeypatch):
+    """Files that attach the next one twice: one of 2^24 elements is refused at the bound."""
+    monkeypatch.setattr(copies, "MOST_COPIES", 2000)
+    read, include = [], SourceFiles.include
+    monkeypatch.setattr(SourceFiles, "include", lambda self, name, *more: (
+        read.append(name), include(self, name, *more))[1])  # fmt: skip
+    for k in range(25):
+        twice = '<attach model="m" prefix="a"/><attach model="m" prefix="b"/>' if k < 24 else ""
+        (tmp_path / f"{k}.xml").write_text(f"""<mujoco><asset><model name="m" file="{k + 1}.xml"/>
+          </asset><worldbody>{twice}</worldbody></mujoco>""")
+    with pytest.raises(dap.SceneError, match="more than 2000 elements"):
+        dap.import_model(tmp_path / "0.xml")
+    assert sorted(read) == sorted(f"{k + 1}.xml" for k in range(24))
 
 
 def test_options_of_an_attached_model_are_those_of_the_top(tmp_path):

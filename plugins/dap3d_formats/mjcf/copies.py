@@ -36,13 +36,14 @@ def read_document(source: Source) -> Document:
     Raises:
         FormatError: it cannot be read.
     """
-    return _read(source, source.xml(), source.path.parent)
+    return _read(source, source.xml(), source.path.parent, {})
 
 
-def _read(source: Source, root: XmlElement, folder: Path) -> Document:
+def _read(source: Source, root: XmlElement, folder: Path, models: dict[Path, Document]) -> Document:
+    """A document; models: those that have been read, by file."""
     document = Document.of(source, root, folder)
     note_elements(root, CONTACTS if source.contacts else MJCF, source.remarks)
-    copier = _Copier(document)
+    copier = _Copier(document, models)
     for world in root.all("worldbody"):
         copier.attach(world)
     copier.expand(root)
@@ -52,6 +53,7 @@ def _read(source: Source, root: XmlElement, folder: Path) -> Document:
 @attrs.define
 class _Copier:
     document: Document
+    models: dict[Path, Document]
     made: int = 0
 
     def attach(self, holder: XmlElement) -> None:
@@ -108,9 +110,12 @@ class _Copier:
             what = f"model of <attach>: there is no model {name!r} in <asset>{known}"
             raise FormatError(what, element.place, f'add <model name="{name}" file="..."/> to it')
         file, place = models[name]
-        root = source.include(file, place, folder)
-        with source.including(file, folder):
-            return _read(source, root, (folder / file).parent)
+        path = folder / file
+        if path not in self.models:  # files that attach others twice are read once
+            root = source.include(file, place, folder)
+            with source.including(file, folder):
+                self.models[path] = _read(source, root, path.parent, self.models)
+        return self.models[path]
 
     def expand(self, element: XmlElement) -> None:
         children: list[XmlElement] = []

@@ -28,11 +28,11 @@ _ACTUATOR = (
 _EQUALITY = taken("name class active") | translated("solref solimp", "the equality holds exactly")
 
 _TENDON = (
-    taken("name class limited range stiffness damping springlength")
+    taken("name class limited range stiffness damping springlength armature")
     | noted("group width material rgba user", _DRAWING)
     | moves("solreflimit solimplimit solreffriction solimpfriction margin", _SOFT)
-    | moves("frictionloss armature actuatorfrclimited actuatorfrcrange springyield",
-            "friction, armature and bounds of tendons")
+    | moves("frictionloss actuatorfrclimited actuatorfrcrange springyield",
+            "friction and bounds of tendons")
 )  # fmt: skip
 
 MJCF: Table = {
@@ -140,9 +140,10 @@ MJCF: Table = {
     "distance": moves("", "distances"),
     "tendon": taken(),
     "default/tendon": taken() | moves(
-        "frictionloss armature actuatorfrclimited actuatorfrcrange springyield margin "
+        "frictionloss actuatorfrclimited actuatorfrcrange springyield margin "
         "solreflimit solimplimit solreffriction solimpfriction", "of tendons",
-    ) | taken("class limited range stiffness damping springlength group width material rgba user"),
+    ) | taken("class limited range stiffness damping springlength armature group width material "
+              "rgba user"),
     "fixed": taken() | _TENDON,
     "fixed/joint": taken() | taken("joint coef"),
     "spatial": taken() | _TENDON,

@@ -46,7 +46,7 @@ def settled_tendon(reader: MjcfReader, tendon: XmlElement) -> XmlElement:
 
 
 def read_tendons(reader: MjcfReader) -> None:
-    """Read tendons with a spring, a damper or limits.
+    """Read tendons with a spring, a damper, an armature or limits.
 
     Raises:
         FormatError: one names a site, geom or joint that is not there.
@@ -57,9 +57,10 @@ def read_tendons(reader: MjcfReader) -> None:
         low, high = reader.document.bounds(tendon, "range", "limited")
         if reader.document.disables("limit", "constraint"):
             low, high = UNBOUNDED
-        stiffness, damping = (tendon.numbers(key, None, (0.0,))[0]
-                              for key in ("stiffness", "damping"))  # fmt: skip
-        if not (stiffness or damping or (low, high) != UNBOUNDED):
+        stiffness, damping, armature = (
+            tendon.numbers(key, None, (0.0,))[0] for key in ("stiffness", "damping", "armature")
+        )
+        if not (stiffness or damping or armature or (low, high) != UNBOUNDED):
             continue
         line = line_of(reader, tendon, f"tendon{k}")
         if line is None:
@@ -67,7 +68,7 @@ def read_tendons(reader: MjcfReader) -> None:
         rest = tendon.numbers("springlength", None, (-1.0,))
         drawn = set(rest) == {-1.0}
         reader.model.tendons.append(attrs.evolve(
-            line, stiffness=stiffness, damping=damping, limits=Limits(low, high),
+            line, stiffness=stiffness, damping=damping, armature=armature, limits=Limits(low, high),
             rest=_drawn(reader, line) if drawn else rest[-1], play=rest[-1] - rest[0],
         ))  # fmt: skip
 

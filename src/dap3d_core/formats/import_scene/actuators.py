@@ -1,18 +1,20 @@
 """Actuators of a model as inputs, with the forces that they set; tendons, and those that hold."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import inf, isfinite
 from typing import Any
 
+import attrs
 import numpy as np
 
 from dap3d_core.formats.import_scene.joints import LIGHT, add_wheel, from_ground, light, named_ends
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, float_tuple
 from dap3d_core.formats.import_scene.start import AGREE
-from dap3d_core.interface.formats.articulation import Actuator, Articulation, Tendon
+from dap3d_core.interface.formats.articulation import Actuator, Articulation, Limits, Tendon
 from dap3d_core.interface.formats.frames import Frame
-from dap3d_core.interface.formats.tendon_length import length_of_line
+from dap3d_core.interface.formats.tendon_length import length_of_line, rate_of_line
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.tables import GROUND
 
 #: Time constant of soft stops of tendons, s.
@@ -137,7 +139,10 @@ def _act_on_tendon(builder: SceneBuilder, model: Articulation, actuator: Actuato
 
 
 def add_tendons(builder: SceneBuilder, model: Articulation) -> None:
-    """Add springs and dampers of tendons, and stops at their limits; rigid of two points."""
+    """Add springs and dampers of tendons, what they move, and stops at their limits.
+
+    Those of two points are rigid.
+    """
     for tendon in model.tendons:
         line = line_of(builder, model, tendon)
         if line is None:
@@ -149,13 +154,19 @@ def add_tendons(builder: SceneBuilder, model: Articulation) -> None:
         if keyword == "ptp" and not tendon.play:
             ends = dict(zip(("P_i", "P_j"), fields["points"], strict=True))
             _add_limits(builder, tendon, ends)
+            if tendon.armature:
+                _add_slider(builder, model, attrs.evolve(tendon, limits=Limits()), fields)
             fields, spring["l0"] = ends, tendon.rest or None
         else:
             keyword = "tendon" if keyword == "ptp" else keyword
             if tendon.terms:
                 _add_stops(builder, model, tendon, keyword, fields)
+                if tendon.armature:
+                    text = "armature of a sum of joints is that of a wheel that turns by it"
+                    builder.remarks.translate(tendon.place, text)
+                    _turn_by_sum(builder, model, tendon, fields)
             else:
-                _add_slider(builder, tendon, dict(fields))
+                _add_slider(builder, model, tendon, fields)
             spring |= {"length": tendon.rest, "play": tendon.play or None}
         if tendon.stiffness or tendon.damping:
             name = builder.names.free("forces", f"{tendon.name}_spring")
@@ -286,13 +297,18 @@ def _limits(builder: SceneBuilder, tendon: Tendon) -> bool:
     return False
 
 
-def _add_slider(builder: SceneBuilder, tendon: Tendon, fields: dict[str, Any]) -> None:
-    """Add a light slider that rises as a tendon lengthens, with its limits, which are rigid."""
-    if not _limits(builder, tendon):
+def _add_slider(
+    builder: SceneBuilder, model: Articulation, tendon: Tendon, fields: Mapping[str, Any]
+) -> None:
+    """Add a slider that moves as a tendon lengthens, with its armature and its rigid limits."""
+    limits = tendon.limits if _limits(builder, tendon) else Limits()
+    if not (limits.finite or tendon.armature):
         return
     text = "limits of tendons are those of a slider, with a millionth of the mass that they move"
+    if tendon.armature:
+        text = "armature of a tendon is the mass of a slider, with its limits"
     builder.remarks.translate(tendon.place, text)
-    scene, names, limits = builder.scene, builder.names, tendon.limits
+    scene, names = builder.scene, builder.names
     links = [link for link, _ in tendon.points] + [drum.link for drum in tendon.drums]
     masses = [builder.groups[builder.member[link][0]].inertial.mass for link in links]
     slider = names.free("bodies", f"{tendon.name}_slider")
@@ -300,19 +316,30 @@ def _add_slider(builder: SceneBuilder, tendon: Tendon, fields: dict[str, Any]) -
     if not limits.lower - AGREE <= start <= limits.upper + AGREE:
         text = "a tendon starts beyond its limits: they hold it where it starts"
         builder.remarks.translate(tendon.place, text, motion=True)
-    mass = LIGHT * min(mass for mass in masses if mass)
-    scene.add_body(slider, mass=mass, Jp=(mass,) * 3, r=(0.0, 0.0, start))
+    mass = tendon.armature or LIGHT * min(mass for mass in masses if mass)
+    level = _level(model.gravity)  # a rail along which it weighs nothing
+    rate = rate_of_line(tendon, builder.pose_of, builder.motion_of)
+    scene.add_body(slider, mass=mass, Jp=(mass,) * 3, r=float_tuple(start * level),
+                   r_dot=float_tuple(rate * level) if rate else None)  # fmt: skip
+    rail = scene.add_vector(names.free("vectors", f"{slider}_way"), "ground", float_tuple(level))
     scene.add_joint(
         "tran", names.free("joints", f"{slider}_rail"), P_i=f"{slider}.O", P_j="ground.O",
-        a_j="ground.z",
+        a_j=rail,
         lower=min(limits.lower - start, 0.0) if limits.lower > 0.0 else None,
         upper=max(limits.upper - start, 0.0) if isfinite(limits.upper) else None,
     )  # fmt: skip
     name = names.free("joints", f"{tendon.name}_length")
-    fields |= {"points": (*fields["points"], "ground.O", f"{slider}.O"),
-               "divisors": (*(tendon.divisors or (1.0,) * len(links))[: len(tendon.points) - 1],
-                            0.0, -1.0, 1.0)}  # fmt: skip
-    scene.add_joint("tendon", name, **fields)
+    more = {"points": (*fields["points"], "ground.O", f"{slider}.O"),
+            "divisors": (*(tendon.divisors or (1.0,) * len(links))[: len(tendon.points) - 1],
+                         0.0, -1.0, 1.0)}  # fmt: skip
+    scene.add_joint("tendon", name, **{**fields, **more})
+
+
+def _level(gravity: Sequence[float]) -> Floats:
+    """A unit vector across gravity."""
+    across = np.cross(np.eye(3)[np.argmin(np.abs(gravity))], gravity)
+    size = np.linalg.norm(across)
+    return across / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
 
 
 def add_held(builder: SceneBuilder, model: Articulation) -> None:
@@ -336,21 +363,38 @@ def add_held(builder: SceneBuilder, model: Articulation) -> None:
 def _hold_sum(
     builder: SceneBuilder, model: Articulation, tendon: Tendon, fields: Mapping[str, Any]
 ) -> None:
-    """Hold a sum: wheels turn by a term, or by the sum up to there, and ground by the whole."""
-    joints = [model.joints[name] for name, _ in tendon.terms if model.joints[name].kind != "fixed"]
     at_start = sum(c * (*model.joints[name].position, 0.0)[0] for name, c in tendon.terms)
     if abs(at_start - (tendon.rest or 0.0)) > AGREE:
         text = "an equality of a tendon holds the length that it has where the scene starts"
         builder.remarks.translate(tendon.place, text, motion=True)
     text = "sums of joints are held by wheels on ground, with a millionth of the inertia"
     builder.remarks.translate(tendon.place, text)
-    size, names = light(builder, *joints), builder.names
-    scale = max(abs(c) for c in fields["coefs"])
+    _turn_by_sum(builder, model, tendon, fields)
+
+
+def _turn_by_sum(
+    builder: SceneBuilder, model: Articulation, tendon: Tendon, fields: Mapping[str, Any]
+) -> None:
+    """Let wheels turn by a term, or by the sum up to there, and the last one by the whole.
+
+    That has the armature, or is ground where there is none.
+    """
+    moving = [
+        (model.joints[name], c)
+        for name, c in tendon.terms
+        if model.joints[name].kind != "fixed" and not builder.moves_alone(model.joints[name])
+    ]
+    size, names = light(builder, *(joint for joint, _ in moving)), builder.names
+    scale, rate = max(abs(c) for c in fields["coefs"]), 0.0
+    whole = tendon.armature * scale**2
     columns = [fields[key] for key in ("movers", "axes", "coefs", "slides")]
     total, count = "ground", len(fields["movers"])
     for k, (mover, axis, coef, slides) in enumerate(zip(*columns, strict=True), 1):
         wheel = names.free("bodies", f"{tendon.name}_term{k}")
-        add_wheel(builder, wheel, *size)
+        speed = coef / scale * (*moving[k - 1][0].rate, 0.0)[0]
+        rate += speed
+        own = (size[0], whole) if count == 1 else size
+        add_wheel(builder, wheel, own[0], own[1], speed)
         builder.scene.add_joint(
             "follow", names.free("joints", f"{wheel}_follows"), body_i=mover, a_j=axis,
             a_k=f"{wheel}.z", ratio=scale / coef, along=True if slides else None,
@@ -359,9 +403,10 @@ def _hold_sum(
             total = wheel
             continue
         before, total = total, "ground"
-        if k < count:
+        if k < count or whole:
             total = names.free("bodies", f"{tendon.name}_sum{k}")
-            add_wheel(builder, total, *size)
+            own = (size[0], whole) if k == count else size
+            add_wheel(builder, total, own[0], own[1], rate)
         builder.scene.add_joint(
             "follow", names.free("joints", f"{tendon.name}_sum{k}"), body_i=total,
             a_j=f"{before}.z", a_k=f"{wheel}.z",

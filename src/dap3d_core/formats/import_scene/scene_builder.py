@@ -3,12 +3,14 @@
 from typing import Any
 
 import attrs
+import numpy as np
 
 from dap3d_core.formats.import_scene.rigid_groups import RigidGroup
 from dap3d_core.interface.formats.articulation import WORLD, Contact, Joint
 from dap3d_core.interface.formats.frames import IDENTITY, Frame, from_quaternion
 from dap3d_core.interface.formats.joint_inertia import JointInertia
 from dap3d_core.interface.formats.remarks import Place, Remarks
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.scene import Scene
 from dap3d_core.scene.tables import GROUND, fault_of_name
 
@@ -92,6 +94,15 @@ class SceneBuilder:
             return frame
         body = self.scene.bodies[name]
         return Frame(body.r, from_quaternion(body.p)) @ frame
+
+    def motion_of(self, link: str, at: Any) -> tuple[Floats, Floats]:
+        """Velocity of a point of a link where the scene starts, and how the link turns."""
+        name, frame = self.attached(link, Frame(at))
+        if name == GROUND:
+            return np.zeros(3), np.zeros(3)
+        body = self.scene.bodies[name]
+        v, w = (np.array(one or (0.0, 0.0, 0.0), dtype=float) for one in (body.r_dot, body.w))
+        return v + np.cross(w, from_quaternion(body.p) @ frame.r), w
 
     def attached(self, link: str, frame: Frame) -> tuple[str, Frame]:
         """A frame of a link as body and frame in its axes at its mass centre."""

@@ -38,9 +38,9 @@ CONE, ALONE, WHOLE = range(3)
 #: What a contact does in a step: it collides, and comes to a stop or bounces; or it stays closed.
 STOPS, BOUNCES, STAYS = 1, 2, 3
 #: Arrays of which a row belongs to a contact.
-OF_CONTACTS = ("bodies", "key", "kind", "under", "group", "chosen", "J", "moved", "own",
-               "own_held", "gap", "mu", "rim", "e", "bias", "r", "left", "collides", "closing",
-               "x", "u", "z", "B", "B_factored", "push", "kept", "missing", "met",
+OF_CONTACTS = ("bodies", "key", "kind", "under", "group", "next_contact", "chosen", "J",
+               "moved", "own", "own_held", "gap", "mu", "rim", "e", "bias", "r", "collides",
+               "closing", "x", "u", "z", "B", "B_factored", "push", "kept", "missing", "met",
                "x_bounce")  # fmt: skip
 
 
@@ -61,7 +61,8 @@ class StepArrays(Arrays):
 
     types: ClassVar[dict[str, Any]] = {
         **dict.fromkeys(
-            ("integer", "key", "kind", "under", "group", "chosen", "collides", "declared_gap",
+            ("integer", "key", "kind", "under", "group", "next_contact", "chosen", "collides",
+             "machine", "next_body", "row_owner", "rows", "next_row", "declared_gap",
              "declared_mode", "declared_kind", "declared_turns", "declared_law", "declared_under",
              "declared_at", "load_row",
              "load_count", "load_pushes", "held",
@@ -69,7 +70,7 @@ class StepArrays(Arrays):
              "entry_start", "entries", "bits", "slots", "exchanged"),
             INTEGERS,
         ),
-        **dict.fromkeys(("bodies", "declared_bodies", "declared_place"), INTEGER_MATRIX),
+        **dict.fromkeys(("bodies", "first", "declared_bodies", "declared_place"), INTEGER_MATRIX),
         **dict.fromkeys(
             ("poses", "Jp", "Jp_inverse", "spin", "spin_inverse", "before", "free", "v", "delta",
              "trial", "rest", "trial_rest", "end", "path", "J", "moved", "own", "own_held",
@@ -93,6 +94,7 @@ class StepArrays(Arrays):
     # of a solution
     chosen_count = _integer()
     used_count = _integer()
+    row_count = _integer()
     matrix_size = _integer()  # numbers of K that are needed
     width = _integer()  # numbers from row to row of K: all unknowns, or 6 where it has blocks
     entry_count = _integer()  # blocks of K below the diagonal
@@ -143,7 +145,10 @@ class StepArrays(Arrays):
     bounce: Floats  # (n + 1, 5) of each group (restitution.py)
     v_bounce: Floats  # (n + 1, 6), (c, 3), (k,) what bounces lead to
     x_bounce: Floats
-    used: Integers  # bodies of a group of contacts, in the order of K; the place of each, or -1
+    machine: Integers  # the least body of those that joints connect
+    first: Integers  # (n + 1, 3) first body, contact and row of each group, or -1; what follows one
+    next_body: Integers
+    used: Integers  # bodies of a group that is solved, in the order of K; the place of each, or -1
     place: Integers
     parent: Integers  # scratch of groups and of the order of bodies
     queue: Integers
@@ -156,8 +161,9 @@ class StepArrays(Arrays):
     key: Integers  # a number that a contact keeps
     kind: Integers  # CONE, ALONE or WHOLE
     under: Integers  # the contact whose rolling it resists, or -1
-    group: Integers  # the least body of those that contacts connect
-    chosen: Integers  # contacts of a group
+    group: Integers  # the least body of those that joints and contacts connect
+    next_contact: Integers
+    chosen: Integers  # contacts of a group that is solved
     collides: Integers  # STOPS, BOUNCES, STAYS or 0; the part of the step at which it closes
     closing: Floats
     J: Floats  # (c, 36) rows of the velocity of body i less that of j: normal, tangents
@@ -170,7 +176,6 @@ class StepArrays(Arrays):
     e: Floats
     bias: Floats  # (c, 3) m/s, added to velocities
     r: Floats  # masses that rows feel, kg
-    left: Floats  # residuals
     x: Floats  # (c, 3) impulses, N s; what is projected, its slopes, impulses tried, others kept
     z: Floats
     B: Floats
@@ -203,6 +208,9 @@ class StepArrays(Arrays):
     load_pushes: Integers
     declared_x: Floats  # (d, 7) impulses of the last step, modes, directions of slip
     # of rows of joints
+    row_owner: Integers  # the machine of each
+    next_row: Integers
+    rows: Integers  # those of a group that is solved
     row_start: Integers  # (k + 1,) first entry of each
     row_body: Integers  # body of each entry, and where its six numbers are in D of the system
     row_place: Integers
@@ -244,6 +252,7 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
     scratch: dict[str, Any] = {
         **{name: np.zeros(k) for name in (
             "s", "y", "lead", "pull", "y_kept", "y_bounce", "y_free", "free_speed")},
+        **{name: np.zeros(k, dtype=np.int64) for name in ("next_row", "rows")},
         **{name: np.zeros((0, 0)) for name in ("felt", "answer")},
         "small": np.zeros(SMALL_SIZE**2 if k else 0),
         "small_step": np.zeros(SMALL_SIZE if k else 0),
@@ -305,7 +314,8 @@ def _of_bodies(model: Model) -> dict[str, Any]:
         **{name: np.zeros(n + 1) for name in (
             "margin", "shape_reach", "mass", "mass_inverse", "hit", "flies")},
         **{name: np.zeros(n + 1, dtype=np.int64) for name in (
-            "used", "place", "parent", "queue", "order")},
+            "next_body", "used", "place", "parent", "queue", "order")},
+        "first": np.zeros((n + 1, 3), dtype=np.int64),
         "entry_start": np.zeros(n + 2, dtype=np.int64),
         **{name: np.zeros(0, dtype=np.int64) for name in ("bits", "entries")},
     }  # fmt: skip
@@ -325,7 +335,7 @@ def _of_contacts(room: int) -> dict[str, Any]:
               **dict.fromkeys(("own", "own_held", "B", "B_factored"), 9),
               **dict.fromkeys(("x", "u", "z", "bias", "push", "kept", "missing", "x_bounce"),
                               3)}  # fmt: skip
-    whole = ("bodies", "key", "kind", "under", "group", "chosen", "collides")
+    whole = ("bodies", "key", "kind", "under", "group", "next_contact", "chosen", "collides")
     return {
         name: np.zeros((room, widths[name]) if name in widths else room,
                        dtype=np.int64 if name in whole else float)
@@ -340,7 +350,16 @@ def _joint_rows(evaluator: Evaluator) -> dict[str, Any]:
     order = np.flatnonzero(row < own)
     order = order[np.argsort(row[order], kind="stable")]
     start = np.searchsorted(row[order], np.arange(own + 1))
+    machine, found = np.arange(evaluator.model.body_count + 1), None
+    while found is None or not np.array_equal(machine, found):
+        found = machine.copy()
+        for first, last in itertools.pairwise(start):
+            bodies = body[order[first:last]]
+            machine[bodies] = machine[bodies].min(initial=len(machine))
+    owner = np.array([machine[body[order[k]]] for k in start[:-1]], dtype=np.int64)
     return {
+        "machine": machine,
+        "row_owner": owner,
         "row_start": start.astype(np.int64),
         "row_body": np.ascontiguousarray(body[order]),
         "row_place": np.ascontiguousarray(place[order]),

@@ -17,13 +17,14 @@ from dap3d_core.kernels.runtime.cache import compiled
 
 @compiled
 def sweep_bodies(
-    bodies: Integers, J: Floats, moved: Floats, own: Floats, bias: Floats, kind: Integers,
-    under: Integers, mu: Floats, rim: Floats, x: Floats, v: Floats, sweeps: int, tolerance: float,
-    relax: float,
+    chosen: Integers, bodies: Integers, J: Floats, moved: Floats, own: Floats, bias: Floats,
+    kind: Integers, under: Integers, mu: Floats, rim: Floats, x: Floats, v: Floats, sweeps: int,
+    tolerance: float, relax: float,
 ) -> int:  # fmt: skip
     """Sweep until no impulse changes by more than a part of the largest; sweeps done.
 
     Args:
+        chosen: the contacts of a group, of m.
         bodies: (m, 2) i and j, ground 0.
         J, moved: (m, 36) rows normal, tangents, each of bodies i and j; the same times M^-1.
         own: (m, 9) J moved^T of each contact.
@@ -37,7 +38,8 @@ def sweep_bodies(
     """
     for done in range(sweeps):
         change, largest = 0.0, 1e-300
-        for c in range(mu.size):
+        for q in range(chosen.size):
+            c = chosen[q]
             i, j = bodies[c, 0], bodies[c, 1]
             a, b, rows, moves = v[i], v[j], J[c], moved[c]
             u0, u1, u2 = bias[c, 0], bias[c, 1], bias[c, 2]
@@ -62,29 +64,31 @@ def sweep_bodies(
 
 @compiled
 def sweep_contacts(
-    felt: Floats, own: Floats, u: Floats, kind: Integers, under: Integers, mu: Floats, rim: Floats,
-    x: Floats, sweeps: int, tolerance: float,
+    chosen: Integers, felt: Floats, own: Floats, u: Floats, kind: Integers, under: Integers,
+    mu: Floats, rim: Floats, x: Floats, sweeps: int, tolerance: float,
 ) -> int:  # fmt: skip
     """The same where joints answer as well: u = felt x + what there is without impulses.
 
     Args:
-        felt: (3 m, 3 m) how contacts feel each other, symmetric.
+        chosen: the contacts of a group, n of m.
+        felt: (3 n, 3 n) how these feel each other, symmetric.
         own: (m, 9) its diagonal blocks; contacts whose first number is zero are left as they are.
         u: (m, 3) velocities with the impulses x, changed with them.
         kind, under, mu, rim, x, sweeps, tolerance: as of ``sweep_bodies``.
     """
     for done in range(sweeps):
         change, largest = 0.0, 1e-300
-        for c in range(mu.size):
+        for place in range(chosen.size):
+            c = chosen[place]
             if own[c, 0] == 0.0:
                 continue
             if under[c] >= 0:
                 rim[c] = x[under[c], 0]
             d0, d1, d2 = change_of(own[c], kind[c], mu[c], rim[c], x[c], u[c, 0], u[c, 1], u[c, 2])
-            p, q, r = felt[3 * c], felt[3 * c + 1], felt[3 * c + 2]
-            for k in range(mu.size):
+            p, q, r = felt[3 * place], felt[3 * place + 1], felt[3 * place + 2]
+            for k in range(chosen.size):
                 for s in range(3):
-                    u[k, s] += p[3 * k + s] * d0 + q[3 * k + s] * d1 + r[3 * k + s] * d2
+                    u[chosen[k], s] += p[3 * k + s] * d0 + q[3 * k + s] * d1 + r[3 * k + s] * d2
             change = max(change, abs(d0), abs(d1), abs(d2))
             largest = max(largest, x[c, 0] if kind[c] == CONE else size_of(x[c]))
         if change <= tolerance * largest:

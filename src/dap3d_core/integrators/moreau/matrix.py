@@ -1,4 +1,4 @@
-"""Groups of contacts that feel each other; the matrix of a pass of Newton's method, its factors.
+"""The matrix of a pass of Newton's method for a group of contacts, and its factors.
 
 Elimination is in one thread, and in the same order everywhere.
 """
@@ -19,51 +19,7 @@ REUSED = 1e-2
 BITS = 32
 
 
-# ------------------------------------------------------------------ groups and the order of bodies
-
-
-@compiled
-def root_of(parent: Integers, b: int) -> int:
-    """The least body of a group; ways to it become shorter."""
-    while parent[b] != b:
-        parent[b] = parent[parent[b]]
-        b = parent[b]
-    return b
-
-
-@compiled
-def find_groups(s: StepArrays) -> None:
-    """Find the group of each contact; where there are joints, all are one."""
-    for b in range(s.parent.size):
-        s.parent[b] = b
-    for c in range(s.contact_count):
-        i, j = s.bodies[c, 0], s.bodies[c, 1]
-        if i > 0 and j > 0:
-            i, j = root_of(s.parent, i), root_of(s.parent, j)
-            s.parent[max(i, j)] = min(i, j)
-    for c in range(s.contact_count):
-        i = s.bodies[c, 0] if s.bodies[c, 0] > 0 else s.bodies[c, 1]
-        s.group[c] = root_of(s.parent, i) if s.y.size == 0 else 0
-
-
-@compiled
-def choose(s: StepArrays, group: int) -> None:
-    """Take the contacts of a group, all for -1, and their bodies; where there are joints, all."""
-    for b in range(s.place.size):
-        s.place[b] = -1 if s.y.size == 0 else 0
-    s.chosen_count = s.used_count = 0
-    for c in range(s.contact_count):
-        if group < 0 or s.group[c] == group:
-            s.chosen[s.chosen_count] = c
-            s.chosen_count += 1
-            for side in range(2):
-                s.place[s.bodies[c, side]] = 0
-    s.place[0] = -1
-    for b in range(1, s.place.size):
-        if s.place[b] == 0:
-            s.used[s.used_count] = b
-            s.place[b] = s.used_count
-            s.used_count += 1
+# ------------------------------------------------------------------ the order of bodies
 
 
 @compiled
@@ -95,7 +51,8 @@ def connect(s: StepArrays) -> None:
         i, j = s.bodies[s.chosen[q], 0], s.bodies[s.chosen[q], 1]
         if i > 0 and j > 0:
             join(s, s.place[i], s.place[j])
-    for k in range(s.y.size):
+    for n in range(s.row_count):
+        k = s.rows[n]
         for p in range(s.row_start[k], s.row_start[k + 1]):
             for q in range(s.row_start[k], p):
                 join(s, s.place[s.row_body[p]], s.place[s.row_body[q]])
@@ -241,7 +198,8 @@ def assemble(s: StepArrays, weight: float, feels: float) -> None:
             add_pressed(s, c, weight)
         elif s.kind[c] != CONE and feels > 0.0:
             add_load(s, c, weight)
-    for k in range(s.y.size):
+    for n in range(s.row_count):
+        k = s.rows[n]
         for p in range(s.row_start[k], s.row_start[k + 1]):
             for q in range(s.row_start[k], s.row_start[k + 1]):
                 start = block_at(s, s.place[s.row_body[p]], s.place[s.row_body[q]])

@@ -131,10 +131,11 @@ def put_velocities(s: StepArrays, v: Floats) -> None:
         for k in range(6):
             first[k] += x0 * moved[k] + x1 * moved[12 + k] + x2 * moved[24 + k]
             second[k] += x0 * moved[6 + k] + x1 * moved[18 + k] + x2 * moved[30 + k]
-    if s.y.size > 0:
+    if s.row_count > 0:
         clear(s, s.rest)
         add_pull(s, s.y, s.rest)
-        for b in range(1, v.shape[0]):
+        for q in range(s.used_count):
+            b = s.used[q]
             add_inverse(s, b, s.rest[b], v[b])
 
 
@@ -149,7 +150,8 @@ def clear(s: StepArrays, out: Floats) -> None:
 @compiled
 def add_pull(s: StepArrays, y: Floats, out: Floats) -> None:
     """Add D^T y."""
-    for k in range(y.size):
+    for n in range(s.row_count):
+        k = s.rows[n]
         pull = y[k]
         for q in range(s.row_start[k], s.row_start[k + 1]):
             row, D = out[s.row_body[q]], s.D[q]
@@ -214,7 +216,8 @@ def residual_of(s: StepArrays, v: Floats, left: float) -> float:
         c = s.chosen[q]
         left = max(left, left_at(s, c, v))
         largest = max(largest, impulse_of(s, c))
-    for k in range(s.y.size):
+    for q in range(s.row_count):
+        k = s.rows[q]
         speed = speed_of(s, k, v) - s.free_speed[k]
         left, largest = max(left, abs(s.s[k] * speed)), max(largest, abs(s.y[k]))
     return left / max(largest, s.least, TINY)
@@ -231,7 +234,8 @@ def begin_round(s: StepArrays) -> None:
             s.delta[s.used[q], k] = 0.0
     for q in range(s.chosen_count):
         put_speeds(s, s.chosen[q], s.v)
-    for k in range(s.y.size):
+    for q in range(s.row_count):
+        k = s.rows[q]
         s.lead[k] = speed_of(s, k, s.v) - s.free_speed[k]
 
 
@@ -242,7 +246,8 @@ def put_rest(s: StepArrays, delta: Floats, weight: float, R: Floats) -> float:
     ``push`` and ``pull`` become the impulses there, z what is projected. Weights multiply the
     rounding of delta, and not that of v.
     """
-    for k in range(s.y.size):
+    for q in range(s.row_count):
+        k = s.rows[q]
         s.pull[k] = s.y[k] - weight * s.s[k] * (s.lead[k] + speed_of(s, k, delta))
     clear(s, R)
     add_pull(s, s.pull, R)

@@ -1,4 +1,8 @@
-"""The problem of one step: which impulses of its contacts keep bodies apart, with friction."""
+"""The problem of one step: which impulses of its contacts keep bodies apart, with friction.
+
+Bodies that joints and contacts connect, without ground, are a group. No group feels what another
+one does, and each is solved as if it were alone.
+"""
 
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
@@ -11,7 +15,7 @@ from dap3d_core.integrators.moreau.gauss_seidel import (
     sweep_bodies,
     sweep_contacts,
 )
-from dap3d_core.integrators.moreau.matrix import choose, find_groups, lay_out
+from dap3d_core.integrators.moreau.matrix import lay_out
 from dap3d_core.integrators.moreau.newton import (
     SMALL,
     TINY,
@@ -34,9 +38,11 @@ from dap3d_core.integrators.moreau.reduced import (
     reduced_round,
 )
 from dap3d_core.integrators.stepping.vector_ops import copy
-from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
 
+#: Columns of ``first``: what the lists of a group begin with.
+BODY, CONTACT, ROW = range(3)
 #: Residual from which Newton's method begins, and sweeps of Gauss-Seidel that lead there.
 NEAR, SWEEPS = 1e-4, 200
 #: Over-relaxation of sweeps: piles of spheres took 1250 sweeps with 1, 720 with 1.5, and more than
@@ -56,7 +62,7 @@ FELT = 2
 #: A round helps where it leaves less than this part of the residual. Where nothing else has led to
 #: a solution, rounds that leave less than the next ask for a larger weight: what hardly moves is
 #: felt with that alone. Rounds at most.
-HELPS, SLOW, ROUNDS = 0.5, 0.95, 40
+HELPS, SLOW, ROUNDS = 0.5, 0.999, 40
 #: Part of the tolerance to which a round is solved.
 INNER = 1e-2
 #: A residual from which a round that does not help is the last.
@@ -75,8 +81,7 @@ def arrays_of(evaluator: Evaluator, size: int, remembered: int) -> StepArrays:
 
 @compiled
 def prepare_problem(s: StepArrays) -> None:
-    """What contacts and joints feel of the masses: J M^-1, its diagonal blocks, and those of D."""
-    s.carries = 0
+    """What contacts feel of the masses: J M^-1, and its diagonal blocks."""
     for c in range(s.contact_count):
         J, moved, own = s.J[c], s.moved[c], s.own[c]
         for side in range(6):
@@ -87,9 +92,17 @@ def prepare_problem(s: StepArrays) -> None:
                 for k in range(12):
                     total += moved[12 * r + k] * J[12 * q + k]
                 own[3 * r + q] = total
-        s.r[c] = 1.0 / max(own[0], own[4], own[8], TINY)
-    for k in range(s.y.size):
-        felt = 0.0
+
+
+@compiled
+def take_own(s: StepArrays) -> None:
+    """Take rows of a group as those of the masses of its bodies."""
+    s.carries = 0
+    for q in range(s.chosen_count):
+        own = s.own[s.chosen[q]]
+        s.r[s.chosen[q]] = 1.0 / max(own[0], own[4], own[8], TINY)
+    for n in range(s.row_count):
+        k, felt = s.rows[n], 0.0
         for q in range(s.row_start[k], s.row_start[k + 1]):
             D, turned = s.D[q], s.change
             times_inverse(s, s.row_body[q], D, turned)
@@ -105,15 +118,16 @@ def take_carried(s: StepArrays) -> None:
     With their own masses, 1e-6 of those, a round of Newton's method leaves nearly all it finds.
     """
     s.carries = 1
-    for c in range(s.contact_count):
+    for q in range(s.chosen_count):
+        c = s.chosen[q]
         i, j, J, most = s.bodies[c, 0], s.bodies[c, 1], s.J[c], TINY
         if s.carried[i, 0] + s.carried[j, 0] > 0.0:
             for r in range(3):
                 felt = felt_by(s, i, J[12 * r :]) + felt_by(s, j, J[12 * r + 6 :])
                 most = max(most, felt)
             s.r[c] = 1.0 / most
-    for k in range(s.y.size):
-        felt, light = TINY, 0.0
+    for n in range(s.row_count):
+        k, felt, light = s.rows[n], TINY, 0.0
         for q in range(s.row_start[k], s.row_start[k + 1]):
             felt += felt_by(s, s.row_body[q], s.D[q])
             light += s.carried[s.row_body[q], 0]
@@ -141,15 +155,38 @@ def solve(s: StepArrays, tolerance: float) -> bool:
             normal ones are not to become negative then; ``x``, ``y`` are tried first.
         tolerance: of the residual, a part of the largest impulse.
     """
-    few, joined = s.contact_count <= FEW, s.y.size > 0
-    s.least = 0.0
+    worst = 0.0
     for b in range(s.v.shape[0]):
-        for k in range(6):
-            s.v[b, k] = s.trial[b, k] = s.free[b, k]
-            s.least = max(s.least, LEAST_IMPULSE * s.mass[b] * abs(s.free[b, k if k < 3 else 0]))
-    for k in range(s.y.size):
+        copy(s.v[b], s.free[b])
+        copy(s.trial[b], s.free[b])
+    list_groups(s)
+    for b in range(1, s.v.shape[0]):
+        if s.first[b, BODY] >= 0:
+            choose(s, b)
+            if not solve_group(s, tolerance):
+                return False
+            worst = max(worst, s.residual)
+    s.residual = worst
+    return True
+
+
+@compiled
+def solve_group(s: StepArrays, tolerance: float) -> bool:
+    """Find the impulses of a group, and velocities with them; arguments as of ``solve``."""
+    few, joined = s.chosen_count <= FEW, s.row_count > 0
+    s.least = s.residual = 0.0
+    for q in range(s.used_count):
+        b = s.used[q]
+        for k in range(3):
+            s.least = max(s.least, LEAST_IMPULSE * s.mass[b] * abs(s.free[b, k]))
+    for n in range(s.row_count):
+        k = s.rows[n]
         s.free_speed[k] = speed_of(s, k, s.free)
-    choose(s, -1)
+        if s.chosen_count == 0:
+            s.y[k] = 0.0
+    if s.chosen_count == 0:
+        return True
+    take_own(s)
     if few or joined:
         aim = RESIDUAL_ROUNDING if few and tolerance < NEAR else tolerance
         s.residual = 1e300
@@ -182,39 +219,38 @@ def solve(s: StepArrays, tolerance: float) -> bool:
 
 @compiled
 def judge(s: StepArrays) -> float:
-    """The residual of all contacts, and in ``left`` of each, a part of the largest impulse."""
+    """The residual of the contacts of a group, a part of their largest impulse."""
     put_velocities(s, s.trial)
-    largest = TINY
-    for c in range(s.contact_count):
-        s.left[c] = left_at(s, c, s.trial)
-        largest = max(largest, impulse_of(s, c))
-    s.residual = 0.0
-    for c in range(s.contact_count):
-        s.left[c] /= largest
-        s.residual = max(s.residual, s.left[c])
+    left, largest = 0.0, TINY
+    for q in range(s.chosen_count):
+        left = max(left, left_at(s, s.chosen[q], s.trial))
+        largest = max(largest, impulse_of(s, s.chosen[q]))
+    s.residual = left / largest
     return s.residual
 
 
 @compiled
 def sweep(s: StepArrays, sweeps: int, tolerance: float, relax: float) -> None:
-    """Sweeps of Gauss-Seidel over all contacts."""
-    m = s.contact_count
+    """Sweeps of Gauss-Seidel over the contacts of a group."""
     put_velocities(s, s.v)
-    for c in range(m):
+    for q in range(s.chosen_count):
+        c = s.chosen[q]
         s.rim[c] = 0.0 if s.kind[c] == CONE else rim_of(s, c, s.x, s.y)
-    sweep_bodies(s.bodies, s.J, s.moved, s.own, s.bias, s.kind, s.under, s.mu[:m], s.rim, s.x, s.v,
-                 sweeps, 0.1 * tolerance, relax)  # fmt: skip
+    sweep_bodies(s.chosen[: s.chosen_count], s.bodies, s.J, s.moved, s.own, s.bias, s.kind,
+                 s.under, s.mu, s.rim, s.x, s.v, sweeps, 0.1 * tolerance, relax)  # fmt: skip
 
 
 @compiled
 def finish(s: StepArrays, tolerance: float) -> bool:
-    """Newton's method on groups that are not solved; more sweeps where it does not end."""
+    """Newton's method behind sweeps; more of these where it does not end."""
     done, sweeps, relax, least = SWEEPS, SWEEPS, RELAX, 1e300
     while judge(s) > tolerance:
         relax = relax if s.residual < least else 1.0
         least = min(least, s.residual)
-        if tolerance < NEAR and not refine_groups(s, tolerance):
-            return False
+        if tolerance < NEAR:
+            if not lay_out(s, s.dense_size):
+                return False
+            newton(s, tolerance, False)
         if judge(s) <= tolerance or done >= MOST_SWEEPS:
             break
         if tolerance < NEAR:  # rounds of Newton's method cost more
@@ -225,45 +261,31 @@ def finish(s: StepArrays, tolerance: float) -> bool:
 
 
 @compiled
-def refine_groups(s: StepArrays, tolerance: float) -> bool:
-    """Newton's method on the groups of contacts of which one is not solved; False without room."""
-    find_groups(s)
-    for c in range(s.contact_count):
-        if s.left[c] > tolerance:
-            choose(s, s.group[c])
-            if not lay_out(s, s.dense_size):
-                return False
-            newton(s, tolerance, False)
-            for q in range(s.chosen_count):
-                s.left[s.chosen[q]] = 0.0
-    choose(s, -1)
-    return True
-
-
-@compiled
 def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
     """Improve impulses by sweeps, then Newton's method, to a tolerance; False without room."""
-    m, best = s.contact_count, s.residual
-    copy_impulses(s.x, s.y, s.kept, s.y_kept, m)
+    m, best = s.chosen_count, s.residual
+    copy_impulses(s.x, s.y, s.kept, s.y_kept, s.contact_count)
     for _ in range(HELD_ROUNDS):
         if not factor_joints(s):
             return False
         put_felt(s, MET)
-        for c in range(m):
+        for p in range(m):
+            c = s.chosen[p]
             own = s.own_held[c]
             for r in range(3):
                 for q in range(3):
-                    own[3 * r + q] = s.felt[3 * c + r, 3 * c + q]
+                    own[3 * r + q] = s.felt[3 * p + r, 3 * p + q]
             felt = own[0] if s.kind[c] == CONE else own[0] + own[4] + own[8]
             own[0] = 0.0 if felt * s.r[c] < HELD else max(own[0], TINY)
         for _ in range(MET):
             meet_joints(s)
         put_velocities(s, s.v)
-        for c in range(m):
+        for p in range(m):
+            c = s.chosen[p]
             put_speeds(s, c, s.v)
             s.rim[c] = 0.0 if s.kind[c] == CONE else rim_of(s, c, s.x, s.y)
-        sweep_contacts(s.felt, s.own_held, s.u, s.kind, s.under, s.mu[:m], s.rim, s.x, SWEEPS,
-                       aim)  # fmt: skip
+        sweep_contacts(s.chosen[:m], s.felt, s.own_held, s.u, s.kind, s.under, s.mu, s.rim,
+                       s.x, SWEEPS, aim)  # fmt: skip
         for _ in range(MET):
             meet_joints(s)
         if not lay_out(s, s.dense_size):
@@ -271,9 +293,9 @@ def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
         s.residual = newton(s, aim, False)
         if s.residual < best:
             best = s.residual
-            copy_impulses(s.x, s.y, s.kept, s.y_kept, m)
+            copy_impulses(s.x, s.y, s.kept, s.y_kept, s.contact_count)
         else:
-            copy_impulses(s.kept, s.y_kept, s.x, s.y, m)
+            copy_impulses(s.kept, s.y_kept, s.x, s.y, s.contact_count)
             s.residual = best
         if best <= tolerance:
             break
@@ -348,5 +370,71 @@ def exchange(s: StepArrays) -> None:
         x, push = s.x[s.chosen[q]], s.push[s.chosen[q]]
         for k in range(3):
             x[k], push[k] = push[k], x[k]
-    for k in range(s.y.size):
+    for n in range(s.row_count):
+        k = s.rows[n]
         s.y[k], s.pull[k] = s.pull[k], s.y[k]
+
+
+# ------------------------------------------------------------------ groups
+
+
+@compiled
+def root_of(parent: Integers, b: int) -> int:
+    """The least body of a group; ways to it become shorter."""
+    while parent[b] != b:
+        parent[b] = parent[parent[b]]
+        b = parent[b]
+    return b
+
+
+@compiled
+def find_groups(s: StepArrays) -> None:
+    """Find the group of each contact, by its least body, and in ``parent`` those of bodies."""
+    for b in range(s.parent.size):
+        s.parent[b] = s.machine[b]
+    for c in range(s.contact_count):
+        i, j = s.bodies[c, 0], s.bodies[c, 1]
+        if i > 0 and j > 0:
+            i, j = root_of(s.parent, i), root_of(s.parent, j)
+            s.parent[max(i, j)] = min(i, j)
+    for c in range(s.contact_count):
+        s.group[c] = root_of(s.parent, max(s.bodies[c, 0], s.bodies[c, 1]))
+
+
+@compiled
+def list_groups(s: StepArrays) -> None:
+    """Find the groups, and list what each has; choose none."""
+    find_groups(s)
+    for b in range(s.place.size):
+        s.place[b] = s.first[b, BODY] = s.first[b, CONTACT] = s.first[b, ROW] = -1
+    s.used_count = 0
+    for b in range(s.place.size - 1, 0, -1):
+        g = root_of(s.parent, b)
+        s.next_body[b], s.first[g, BODY] = s.first[g, BODY], b
+    for c in range(s.contact_count - 1, -1, -1):
+        g = s.group[c]
+        s.next_contact[c], s.first[g, CONTACT] = s.first[g, CONTACT], c
+    for k in range(s.y.size - 1, -1, -1):
+        g = root_of(s.parent, s.row_owner[k])
+        s.next_row[k], s.first[g, ROW] = s.first[g, ROW], k
+
+
+@compiled
+def choose(s: StepArrays, group: int) -> None:
+    """Take the bodies, contacts and rows of a group, as listed."""
+    for q in range(s.used_count):
+        s.place[s.used[q]] = -1
+    s.used_count = s.chosen_count = s.row_count = 0
+    b, c, k = s.first[group, BODY], s.first[group, CONTACT], s.first[group, ROW]
+    while b >= 0:
+        s.used[s.used_count], s.place[b] = b, s.used_count
+        s.used_count += 1
+        b = s.next_body[b]
+    while c >= 0:
+        s.chosen[s.chosen_count] = c
+        s.chosen_count += 1
+        c = s.next_contact[c]
+    while k >= 0:
+        s.rows[s.row_count] = k
+        s.row_count += 1
+        k = s.next_row[k]

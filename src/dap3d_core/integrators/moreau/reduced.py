@@ -47,13 +47,13 @@ LESS, LEAST = 1e-2, 1.0
 @compiled
 def is_small(s: StepArrays) -> bool:
     """True of so few contacts beside joints that their problem is solved alone."""
-    return s.y.size > 0 and 3 * s.contact_count <= s.small_step.size
+    return s.row_count > 0 and 3 * s.chosen_count <= s.small_step.size
 
 
 @compiled
 def factor_joints(s: StepArrays) -> bool:
     """Put the factors of the bodies' masses with stiff joints; False without room."""
-    m = s.contact_count
+    m = s.chosen_count
     if 3 * m > s.felt.shape[0]:
         s.held_count = m
         return False
@@ -72,12 +72,13 @@ def put_felt(s: StepArrays, passes: int) -> None:
 
     passes: by which joints are met, each to some 1e-6 of the one before.
     """
-    m = s.contact_count
-    for c in range(m):
+    m = s.chosen_count
+    for p in range(m):
+        c = s.chosen[p]
         for r in range(3):
-            column = 3 * c + r
-            for k in range(s.y.size):
-                s.lead[k] = s.answer[k, column] = 0.0
+            column = 3 * p + r
+            for n in range(s.row_count):
+                s.lead[s.rows[n]] = s.answer[s.rows[n], column] = 0.0
             if r > 0 and s.kind[c] == CONE and s.mu[c] == 0.0 and s.x[c, r] == 0.0:
                 continue  # it never has an impulse
             for turn in range(passes):
@@ -89,12 +90,13 @@ def put_felt(s: StepArrays, passes: int) -> None:
                 if turn > 0:
                     add_pull(s, s.lead, s.delta)
                 solve_bodies(s)
-                for k in range(s.y.size):
+                for n in range(s.row_count):
+                    k = s.rows[n]
                     s.lead[k] -= STIFF * s.s[k] * speed_of(s, k, s.delta)
-            for k in range(s.y.size):
-                s.answer[k, column] = s.lead[k]
-            for q in range(c, m):
-                u0, u1, u2 = velocity_of(s, q, s.delta)
+            for n in range(s.row_count):
+                s.answer[s.rows[n], column] = s.lead[s.rows[n]]
+            for q in range(p, m):
+                u0, u1, u2 = velocity_of(s, s.chosen[q], s.delta)
                 s.felt[3 * q, column] = s.felt[column, 3 * q] = u0
                 s.felt[3 * q + 1, column] = s.felt[column, 3 * q + 1] = u1
                 s.felt[3 * q + 2, column] = s.felt[column, 3 * q + 2] = u2
@@ -119,7 +121,8 @@ def meet_joints(s: StepArrays) -> None:
     """Improve the impulses y of joints, given those of contacts, and put velocities with both."""
     put_velocities(s, s.v)
     left = largest = 0.0
-    for k in range(s.y.size):
+    for n in range(s.row_count):
+        k = s.rows[n]
         missed = s.s[k] * (speed_of(s, k, s.v) - s.free_speed[k])
         left, largest = max(left, abs(missed)), max(largest, abs(s.y[k]))
         s.lead[k] = -STIFF * missed
@@ -128,7 +131,8 @@ def meet_joints(s: StepArrays) -> None:
     clear(s, s.delta)
     add_pull(s, s.lead, s.delta)
     solve_bodies(s)
-    for k in range(s.y.size):
+    for n in range(s.row_count):
+        k = s.rows[n]
         s.y[k] += s.lead[k] - STIFF * s.s[k] * speed_of(s, k, s.delta)
     for q in range(s.used_count):
         for k in range(6):
@@ -141,17 +145,19 @@ def reduced_round(s: StepArrays, weight: float, tolerance: float) -> float:
 
     Returns the weight, less than asked for where no pass was found with that.
     """
-    m = s.contact_count
-    for c in range(m):
-        put_speeds(s, c, s.v)
+    m = s.chosen_count
+    for q in range(m):
+        put_speeds(s, s.chosen[q], s.v)
     while not solve_reduced(s, weight, tolerance) and weight >= LEAST:
         weight *= LESS
-    for k in range(s.y.size):
+    for n in range(s.row_count):
+        k = s.rows[n]
         s.pull[k] = s.y[k]
-        for c in range(m):
+        for q in range(m):
             for r in range(3):
-                s.y[k] += s.answer[k, 3 * c + r] * s.push[c, r]
-    for c in range(m):
+                s.y[k] += s.answer[k, 3 * q + r] * s.push[s.chosen[q], r]
+    for q in range(m):
+        c = s.chosen[q]
         for k in range(3):
             old = s.x[c, k]
             s.x[c, k], s.push[c, k] = old + s.push[c, k], old
@@ -166,7 +172,8 @@ def solve_reduced(s: StepArrays, weight: float, tolerance: float) -> bool:
     Weights multiply the rounding of what impulses change by, and not that of impulses.
     """
     is_far = False
-    for c in range(s.contact_count):
+    for q in range(s.chosen_count):
+        c = s.chosen[q]
         s.push[c, 0] = s.push[c, 1] = s.push[c, 2] = 0.0
     merit = put_missing(s, s.push, weight)
     for _ in range(PASSES):
@@ -180,7 +187,8 @@ def solve_reduced(s: StepArrays, weight: float, tolerance: float) -> bool:
             break
         if better < 0.0:
             is_far = True
-            for c in range(s.contact_count):
+            for q in range(s.chosen_count):
+                c = s.chosen[q]
                 for k in range(3):
                     s.push[c, k] = -s.x[c, k]
             better = put_missing(s, s.push, weight)
@@ -192,7 +200,8 @@ def solve_reduced(s: StepArrays, weight: float, tolerance: float) -> bool:
 def aim_of(s: StepArrays, tolerance: float) -> float:
     """The merit at which a round is solved."""
     size = TINY
-    for c in range(s.contact_count):
+    for q in range(s.chosen_count):
+        c = s.chosen[q]
         for k in range(3):
             x = s.x[c, k] + s.push[c, k]
             size += x * x / s.r[c]
@@ -205,13 +214,14 @@ def put_missing(s: StepArrays, change: Floats, weight: float) -> float:
 
     They are x + change = P(x - weight r (u + W change)).
     """
-    m, total = s.contact_count, 0.0
-    for c in range(m):
+    m, total = s.chosen_count, 0.0
+    for p in range(m):
+        c = s.chosen[p]
         z, x, missing, part = s.z[c], s.x[c], s.missing[c], weight * s.r[c]
         for r in range(3):
-            row, u = s.felt[3 * c + r], s.u[c, r]
+            row, u = s.felt[3 * p + r], s.u[c, r]
             for q in range(m):
-                d = change[q]
+                d = change[s.chosen[q]]
                 u += row[3 * q] * d[0] + row[3 * q + 1] * d[1] + row[3 * q + 2] * d[2]
             z[r] = x[r] - part * u
         s.rim[c] = bound_of(s, c, s.z, s.y)
@@ -228,39 +238,52 @@ def try_reduced(s: StepArrays, weight: float, merit: float, feels: float) -> flo
 
     feels: as of ``try_pass``.
     """
-    m, n, K, step = s.contact_count, 3 * s.contact_count, s.small, s.small_step
-    for c in range(m):
+    m, n, K, step = s.chosen_count, 3 * s.chosen_count, s.small, s.small_step
+    for q in range(m):
+        c = s.chosen[q]
         B, z, part = s.B[c], s.z[c], weight * s.r[c]
         put_slopes(z, feels * s.mu[c], s.rim[c], s.kind[c], B)
         for r in range(3):
-            at, row = n * (3 * c + r), s.felt
+            at, row = n * (3 * q + r), s.felt
             for k in range(n):
                 K[at + k] = part * (
-                    B[3 * r] * row[3 * c, k]
-                    + B[3 * r + 1] * row[3 * c + 1, k]
-                    + B[3 * r + 2] * row[3 * c + 2, k]
+                    B[3 * r] * row[3 * q, k]
+                    + B[3 * r + 1] * row[3 * q + 1, k]
+                    + B[3 * r + 2] * row[3 * q + 2, k]
                 )
-            K[at + 3 * c + r] += 1.0
-            step[3 * c + r] = -s.missing[c, r]
+            K[at + 3 * q + r] += 1.0
+            step[3 * q + r] = -s.missing[c, r]
         size = math.sqrt(z[1] * z[1] + z[2] * z[2])
         if s.kind[c] == ALONE and s.under[c] >= 0 and feels > 0.0 and 0.0 < s.rim[c] < size:
             u = s.under[c]
+            first = 3 * place_of(s, u)
             for r in range(1, 3):  # what resists rolling grows with what presses
                 along = weight * s.r[u] * z[r] / size
                 for k in range(n):
-                    K[n * (3 * c + r) + k] += along * s.felt[3 * u, k]
+                    K[n * (3 * q + r) + k] += along * s.felt[first, k]
     factor_square(K, s.exchanged, n)
     solve_square(K, s.exchanged, step, n)
     part = 1.0
     for _ in range(CUTS):
-        for c in range(m):
+        for q in range(m):
+            c = s.chosen[q]
             for k in range(3):
-                s.kept[c, k] = s.push[c, k] + part * step[3 * c + k]
+                s.kept[c, k] = s.push[c, k] + part * step[3 * q + k]
         found = put_missing(s, s.kept, weight)
         if found < (1.0 - 0.1 * part) * merit:
-            for c in range(m):
+            for q in range(m):
+                c = s.chosen[q]
                 for k in range(3):
                     s.push[c, k] = s.kept[c, k]
             return found
         part *= 0.5
     return -1.0
+
+
+@compiled
+def place_of(s: StepArrays, c: int) -> int:
+    """Place of a contact among those of its group."""
+    q = 0
+    while s.chosen[q] != c:
+        q += 1
+    return q

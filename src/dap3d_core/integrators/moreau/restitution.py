@@ -1,4 +1,4 @@
-"""What collides; bounces with friction that give back no more energy than they take.
+"""What collides, and moves then; bounces with friction that give no more energy than they take.
 
 Newton's law with friction may gain energy (Kane, Levinson, Dynamics: theory and applications, 1985,
 sec. 5.8). Where it would, impulses are a mean of these and of those without a bounce: cones are
@@ -9,14 +9,22 @@ convex, and without a bounce nothing is gained.
 # mypy: disable-error-code="no-any-return"
 
 import math
+from typing import Any
 
 from dap3d_core.integrators.moreau.arrays import BOUNCES, CONE, STOPS, StepArrays
 from dap3d_core.integrators.moreau.contact_set import velocity_of
 from dap3d_core.integrators.moreau.gauss_seidel import copy_impulses
-from dap3d_core.integrators.moreau.matrix import find_groups, root_of
-from dap3d_core.integrators.moreau.problem import solve
+from dap3d_core.integrators.moreau.newton import TINY, product_of
+from dap3d_core.integrators.moreau.problem import (
+    BODY,
+    CONTACT,
+    ROW,
+    find_groups,
+    root_of,
+    solve,
+)
 from dap3d_core.integrators.stepping.vector_ops import copy
-from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: Columns of ``bounce``: work of the impulses of a group with the bounce, half of it, and without;
@@ -94,7 +102,7 @@ def put_flies(s: StepArrays) -> None:
 def spread(s: StepArrays, of_group: Floats) -> None:
     """Give all bodies what their groups have."""
     for b in range(of_group.size):
-        of_group[b] = of_group[root_of(s.parent, b) if s.y.size == 0 else 0]
+        of_group[b] = of_group[root_of(s.parent, b)]
 
 
 @compiled
@@ -181,8 +189,58 @@ def mix(s: StepArrays) -> None:
         for k in range(3):
             s.x[c, k] += part * (s.x_bounce[c, k] - s.x[c, k])
     for b in range(s.v.shape[0]):
-        part = s.bounce[root_of(s.parent, b) if s.y.size == 0 else 0, KEPT]
+        part = s.bounce[root_of(s.parent, b), KEPT]
         for k in range(6):
             s.v[b, k] += part * (s.v_bounce[b, k] - s.v[b, k])
     for k in range(s.y.size):
-        s.y[k] += s.bounce[0, KEPT] * (s.y_bounce[k] - s.y[k])
+        s.y[k] += s.bounce[root_of(s.parent, s.row_owner[k]), KEPT] * (s.y_bounce[k] - s.y[k])
+
+
+# ------------------------------------------------------------------ motion
+
+
+@compiled
+def mark_moved(work: Any, s: StepArrays, goes: Integers) -> None:
+    """Mark by 1 the machines that contacts act on, or that have some near."""
+    for b in range(goes.size):
+        goes[b] = 0
+    for b in range(1, goes.size):
+        m = s.first[b, BODY] if s.first[b, CONTACT] >= 0 and s.first[b, ROW] >= 0 else -1
+        while m >= 0:
+            goes[s.machine[m]], m = 1, s.next_body[m]
+        for k in range(6):
+            if s.end[b, k] != s.free[b, k] or work.pushed[b, k] != 0.0 or s.hit[b] != NOT_HIT:
+                goes[s.machine[b]] = 1
+
+
+@compiled
+def put_falls(s: StepArrays) -> None:
+    """Put what part of their change without contacts bodies that are hit fall by, ``flies``.
+
+    Contacts bear the rest, as far as they push against that change; of what joints connect, as a
+    whole.
+    """
+    sums = s.bounce
+    for b in range(1, s.end.shape[0]):
+        sums[b, 0] = sums[b, 1] = 0.0
+    for b in range(1, s.end.shape[0]):
+        if s.hit[b] != NOT_HIT and s.flies[b] == 0.0:
+            whole = sums[s.machine[b]]
+            for k in range(6):
+                s.change[k], s.turned[k] = s.free[b, k] - s.before[b, k], s.free[b, k] - s.end[b, k]
+            whole[0] += product_of(s.change, s.turned, s.mass[b], s.spin[b])
+            whole[1] += product_of(s.change, s.change, s.mass[b], s.spin[b])
+    for b in range(1, s.end.shape[0]):
+        if s.flies[b] == 0.0:
+            borne, size = sums[s.machine[b], 0], sums[s.machine[b], 1]
+            s.flies[b] = 1.0 - min(max(borne / max(size, TINY), 0.0), 1.0)
+
+
+@compiled
+def mean_of(s: StepArrays, b: int, k: int) -> float:
+    """Mean of a velocity in the step."""
+    before, end, first = s.before[b, k], s.end[b, k], s.hit[b]
+    if first == NOT_HIT:
+        return 0.5 * (before + end)
+    fall, last = s.flies[b] * (s.free[b, k] - before), 1.0 - first
+    return first * (before + 0.5 * first * fall) + last * (end - 0.5 * last * fall)

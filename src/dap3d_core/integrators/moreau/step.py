@@ -36,13 +36,16 @@ from dap3d_core.integrators.moreau.impulses import (
     remember,
     slot_of,
 )
-from dap3d_core.integrators.moreau.newton import TINY, product_of, speed_of
+from dap3d_core.integrators.moreau.newton import product_of, speed_of
 from dap3d_core.integrators.moreau.problem import NEAR, prepare_problem, solve
 from dap3d_core.integrators.moreau.restitution import (
     NOT_HIT,
     OVERLAP,
     limit_bounces,
+    mark_moved,
+    mean_of,
     put_bias,
+    put_falls,
     put_flies,
 )
 from dap3d_core.integrators.stepping.integration_state import (
@@ -246,14 +249,14 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
 @compiled
 def carry_on(work: Any, s: StepArrays) -> None:
     """Move the bodies that contacts or joints act on as they do, as the trial state."""
-    y, trial, h = work.state[Y], work.state[TRIAL], s.h
+    y, trial, h, goes = work.state[Y], work.state[TRIAL], s.h, s.queue
     put_falls(s)
+    mark_moved(work, s, goes)
     for b in range(1, s.end.shape[0]):
-        c, d, goes = coordinate_offset(b), s.trial[b], s.y.size > 0 or s.hit[b] != NOT_HIT
+        c, d = coordinate_offset(b), s.trial[b]
         for k in range(6):
             d[k] = mean_of(s, b, k)
-            goes |= s.end[b, k] != s.free[b, k] or work.pushed[b, k] != 0.0
-        if not goes:
+        if goes[s.machine[b]] == 0:
             copy(d, s.path[b])
             continue
         for k in range(7):
@@ -261,37 +264,6 @@ def carry_on(work: Any, s: StepArrays) -> None:
         move(trial, c, h * d[0], h * d[1], h * d[2], h * d[3], h * d[4], h * d[5])
     trial[trial.size - 1] += work_done(work, s)
     keep_pushed(work, s)
-
-
-@compiled
-def put_falls(s: StepArrays) -> None:
-    """Put what part of their change without contacts bodies that are hit fall by, ``flies``.
-
-    Contacts bear the rest, as far as they push against that change; of jointed bodies, as a whole.
-    """
-    borne = size = 0.0
-    for b in range(1, s.end.shape[0]):
-        if s.hit[b] != NOT_HIT and s.flies[b] == 0.0:
-            for k in range(6):
-                s.change[k], s.turned[k] = s.free[b, k] - s.before[b, k], s.free[b, k] - s.end[b, k]
-            borne += product_of(s.change, s.turned, s.mass[b], s.spin[b])
-            size += product_of(s.change, s.change, s.mass[b], s.spin[b])
-            if s.y.size == 0:
-                s.flies[b] = 1.0 - min(max(borne / max(size, TINY), 0.0), 1.0)
-                borne = size = 0.0
-    for b in range(1, s.end.shape[0] if s.y.size > 0 else 1):
-        if s.flies[b] == 0.0:
-            s.flies[b] = 1.0 - min(max(borne / max(size, TINY), 0.0), 1.0)
-
-
-@compiled
-def mean_of(s: StepArrays, b: int, k: int) -> float:
-    """Mean of a velocity in the step."""
-    before, end, first = s.before[b, k], s.end[b, k], s.hit[b]
-    if first == NOT_HIT:
-        return 0.5 * (before + end)
-    fall, last = s.flies[b] * (s.free[b, k] - before), 1.0 - first
-    return first * (before + 0.5 * first * fall) + last * (end - 0.5 * last * fall)
 
 
 @compiled

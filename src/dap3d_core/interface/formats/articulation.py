@@ -294,6 +294,7 @@ class Tendon:
         drums: between points.
         divisors: by which the line behind each point counts less, 0 where there is none; () for 1.
         terms: joints of one coordinate, and their factors in the sum.
+        armature: mass that its lengthening moves, kg; inertia, kg m^2, of a sum of angles.
     """
 
     name: str
@@ -307,6 +308,7 @@ class Tendon:
     drums: tuple[Drum, ...] = ()
     divisors: tuple[float, ...] = ()
     terms: tuple[tuple[str, float], ...] = ()
+    armature: float = 0.0
 
 
 @attrs.frozen(eq=False)
