@@ -5,9 +5,6 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
-from dap3d_core.assembly.collisions.boxes import CORNERS
-from dap3d_core.assembly.collisions.convex import ROWS
-from dap3d_core.assembly.collisions.records import WIDTH
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays, Scalar
 from dap3d_core.kernels.runtime.cache import compiled
@@ -18,6 +15,11 @@ from dap3d_core.scene.contacts.collision_shapes import PLANE, CollisionShapes
 ROOM = 64
 #: Columns of a pose: position, m, and Euler parameters.
 POSE = 7
+#: Columns of a point: that halfway between both surfaces, the unit normal from shape j to shape i,
+#: the gap. In ``which``: shapes i and j, and a number that tells points of a pair apart.
+POINT, NORMAL, GAP, WIDTH = 0, 3, 6, 7
+#: Rows of scratch: of two polygons of boxes, with corners, at most 8 each; of convex solids.
+CORNERS, ROWS = 16, 120
 
 
 @attrs.define(eq=False, kw_only=True, slots=False)
@@ -69,9 +71,9 @@ class PlacedShapes(Arrays):
     head: Integers
     following: Integers
     pairs: Integers  # (room, 2) shapes
-    which: Integers  # (room, 3), (room, WIDTH) as in records.py
+    which: Integers  # (room, 3), (room, WIDTH) points
     found: Floats
-    scratch: Floats  # of boxes
+    scratch: Floats  # of boxes and balls
     work: Floats  # of convex solids
 
 
@@ -125,6 +127,26 @@ def with_room(s: PlacedShapes) -> PlacedShapes:
         which=np.zeros((points, 3), dtype=np.int64),
         found=np.zeros((points, WIDTH)),
     )
+
+
+@compiled
+def add(
+    shapes: PlacedShapes, count: int, i: int, j: int, feature: int,
+    x: float, y: float, z: float, nx: float, ny: float, nz: float, gap: float,
+) -> int:  # fmt: skip
+    """Append a point whose gap is near; the new count, beyond the room if there is none.
+
+    x, y, z: the point on the surface of shape j.
+    """
+    if not gap < shapes.near[i] + shapes.near[j]:
+        return count
+    if count < shapes.found.shape[0]:
+        which, row, half = shapes.which[count], shapes.found[count], 0.5 * gap
+        which[0], which[1], which[2] = i, j, feature
+        row[0], row[1], row[2] = x + half * nx, y + half * ny, z + half * nz
+        row[3], row[4], row[5] = nx, ny, nz
+        row[6] = gap
+    return count + 1
 
 
 @compiled
