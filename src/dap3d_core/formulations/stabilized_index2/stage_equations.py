@@ -244,8 +244,7 @@ def keep_frames(body: Floats, frames: Floats) -> None:
 def scale_residual(
     R: Floats,
     rows: Floats,
-    blocks: Integers,
-    metric: Floats,
+    system: System,
     matrix: StageMatrix,
     frames: Floats,
     x: Floats,
@@ -255,6 +254,7 @@ def scale_residual(
 
     n: (bodies + 1,) the parts along the Euler parameters.
     """
+    blocks, metric = system.blocks, system.metric
     count = metric.shape[0] - 1
     for b in range(1, count + 1):
         c, f, o = coordinate_offset(b), velocity_offset(b, count), matrix.body_first[b]
@@ -302,14 +302,14 @@ def find_length(s: Any, x: Any, n: Any, matrix: StageMatrix) -> None:
 def unscale_solution(
     x: Floats,
     n: Floats,
-    blocks: Integers,
-    metric: Floats,
+    system: System,
     matrix: StageMatrix,
     frames: Floats,
     out: Floats,
     rows: Floats,
 ) -> None:
     """A solution x as a change of y (13 n + 1,) and of the multipliers (2, rows)."""
+    blocks, metric = system.blocks, system.metric
     count = metric.shape[0] - 1
     for b in range(1, count + 1):
         c, f, o = coordinate_offset(b), velocity_offset(b, count), matrix.body_first[b]

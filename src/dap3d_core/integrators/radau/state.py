@@ -5,6 +5,7 @@ from typing import Any, ClassVar
 
 import attrs
 
+from dap3d_core.assembly.arrays import System
 from dap3d_core.integrators.radau.tableau import MOST_STAGES, RadauMethod
 from dap3d_core.integrators.stepping.integration_state import MOST_COUNTED, STATES, IntegrationState
 from dap3d_core.kernels.array_types import Floats, Integers
@@ -46,6 +47,10 @@ ALLOWED: dict[str, Container[int]] = {
     ),
     "dense_degree": range(TERMS),
 }
+
+#: What a part of a step is given: system, loops, tangent, and the matrix of the stages; in joint
+#: coordinates functions in place of the matrix.
+Given = tuple[System, Any, Any, Any]
 
 
 def _own() -> Scalar[float]:

@@ -5,14 +5,13 @@ Before it the loop sets numbers and the initial state, after it it stores rows. 
 are the same bit for bit whichever points ran before it, and as those of ``simulate``.
 """
 
-from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import attrs
 
 from dap3d_core.assembly.arrays import UNSETTLED, System
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
-from dap3d_core.integrators.stepping.integration_state import FINISHED, NOISE, RUNNING, Function, Y
+from dap3d_core.integrators.stepping.integration_state import FINISHED, NOISE, RUNNING, Y
 from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
 from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays
 from dap3d_core.kernels.runtime.cache import compiled
@@ -103,12 +102,7 @@ def reset_work(points: Points, p: int, work: RungeKuttaState) -> None:
 
 @compiled
 def start(
-    points: Points,
-    p: int,
-    work: RungeKuttaState,
-    starting: Sequence[Function],
-    system: System,
-    loops: Any,
+    points: Points, p: int, work: RungeKuttaState, starting: Any, system: System, loops: Any
 ) -> bool:
     """Start the run of point p; returns False if it has to be run individually."""
     diagnostics, metric = points.diagnostics[p], system.metric
@@ -132,12 +126,7 @@ def start(
 
 @compiled
 def store_row(
-    target: Floats,
-    row: Floats,
-    work: RungeKuttaState,
-    starting: Sequence[Function],
-    system: System,
-    loops: Any,
+    target: Floats, row: Floats, work: RungeKuttaState, starting: Any, system: System, loops: Any
 ) -> None:
     """Store a reported row with its state brought to coordinates of bodies."""
     end, length = 1 + work.state.shape[1], target.shape[0]
@@ -148,12 +137,7 @@ def store_row(
 
 @compiled
 def store_run(
-    points: Points,
-    p: int,
-    work: RungeKuttaState,
-    starting: Sequence[Function],
-    system: System,
-    loops: Any,
+    points: Points, p: int, work: RungeKuttaState, starting: Any, system: System, loops: Any
 ) -> None:
     """Store rows and diagnostics of the run of point p, which has ended."""
     diagnostics, nt = points.diagnostics, work.rows.shape[0]
