@@ -1,12 +1,12 @@
 """The shapes of a model that collide, as arrays of compiled code, and where they are."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 import attrs
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays, Scalar
+from dap3d_core.kernels.runtime.array_struct import Arrays, IntegerMatrix, Matrix, Scalar
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.model.rotations import rotation
 from dap3d_core.scene.contacts.collision_shapes import PLANE, CollisionShapes
@@ -26,55 +26,41 @@ CORNERS, ROWS = 16, 120
 class PlacedShapes(Arrays):
     """m shapes that collide at one pose, and room for the points where they may touch."""
 
-    types: ClassVar[dict[str, Any]] = {
-        **dict.fromkeys(
-            ("integer", "kind", "body", "apart", "material", "solids", "planes", "small", "large",
-             "head", "following"),
-            INTEGERS,
-        ),
-        **dict.fromkeys(("corners", "bits", "cells", "pairs", "which"), INTEGER_MATRIX),
-        **dict.fromkeys(
-            ("at", "local", "size", "vertices", "mu", "mu_roll", "mu_spin", "e", "centre", "axes",
-             "found", "scratch", "work"),
-            MATRIX,
-        ),
-    }  # fmt: skip
-
     pair_count = Scalar[int]("integer")
     point_count = Scalar[int]("integer")  # where it is beyond the room, the points are not all
 
     integer: Integers
     kind: Integers  # those of the model, as in CollisionShapes
     body: Integers
-    at: Floats
-    local: Floats  # (m, 9) rows of the matrices of their axes in the body
-    size: Floats
-    corners: Integers
-    vertices: Floats
-    bits: Integers
+    at: Matrix
+    local: Matrix  # (m, 9) rows of the matrices of their axes in the body
+    size: Matrix
+    corners: IntegerMatrix
+    vertices: Matrix
+    bits: IntegerMatrix
     material: Integers
-    mu: Floats
-    mu_roll: Floats  # none where nothing resists rolling, or spinning
-    mu_spin: Floats
-    e: Floats
+    mu: Matrix
+    mu_roll: Matrix  # none where nothing resists rolling, or spinning
+    mu_spin: Matrix
+    e: Matrix
     apart: Integers
     reach: Floats
     solids: Integers  # indices of all but planes
     planes: Integers
-    centre: Floats  # (m, 3) m, global axes
-    axes: Floats  # (m, 9) rows of the matrices of their axes
+    centre: Matrix  # (m, 3) m, global axes
+    axes: Matrix  # (m, 9) rows of the matrices of their axes
     near: Floats  # (m,) m, nearer than the sum of those of both is near
     sorted: Floats  # (solids,) scratch of the broad phase, as the next five
     small: Integers
     large: Integers
-    cells: Integers
+    cells: IntegerMatrix
     head: Integers
     following: Integers
-    pairs: Integers  # (room, 2) shapes
-    which: Integers  # (room, 3), (room, WIDTH) points
-    found: Floats
-    scratch: Floats  # of boxes and balls
-    work: Floats  # of convex solids
+    pairs: IntegerMatrix  # (room, 2) shapes
+    which: IntegerMatrix  # (room, 3), (room, WIDTH) points
+    found: Matrix
+    scratch: Matrix  # of boxes and balls
+    work: Matrix  # of convex solids
 
 
 def placed_shapes(shapes: CollisionShapes | None) -> PlacedShapes:

@@ -8,12 +8,12 @@ Python nor an exported model has. It only has to let the iteration converge.
 
 import math
 from collections.abc import Iterator
-from typing import Any, ClassVar
+from typing import Any
 
 import attrs
 import numpy as np
 
-from dap3d_core.assembly.arrays import LENGTH, STEP, Floats, Integers, System
+from dap3d_core.assembly.arrays import LENGTH, STEP, Floats, System
 from dap3d_core.assembly.evaluate import zero
 from dap3d_core.formulations.stabilized_index2.jacobian import BENT, MAY_BEND
 from dap3d_core.integrators.radau.convergence import size_of_change
@@ -35,7 +35,11 @@ from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.integration_state import NOISE, OTHER, SCRATCH, TRIAL, Y
 from dap3d_core.integrators.stepping.rounding import ROUNDINGS, SAMPLES, change_digits
 from dap3d_core.kernels.compiler.types import Table
-from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, MATRIX, Arrays
+from dap3d_core.kernels.runtime.array_struct import (
+    Arrays,
+    IntegerMatrix,
+    Matrix,
+)
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.kernels.scalar_math import is_differentiated
 from dap3d_core.linear.lu import StateNode, factor_lu, make_lu_plan, solve_lu
@@ -56,16 +60,11 @@ LEAST_RATE = 1e-2
 class RateTangent(Arrays):
     """df/dy, and the elimination program of a dense matrix."""
 
-    types: ClassVar[dict[str, Any]] = {
-        **dict.fromkeys(("nodes", "columns", "updates"), INTEGER_MATRIX),
-        "J": MATRIX,
-    }
-
-    nodes: Integers  # of linear.lu.LuPlan, as the next two
-    columns: Integers
-    updates: Integers
+    nodes: IntegerMatrix  # of linear.lu.LuPlan, as the next two
+    columns: IntegerMatrix
+    updates: IntegerMatrix
     bends: Floats  # (1,) as of ``Tangent``
-    J: Floats  # (N, N) of all components but the work
+    J: Matrix  # (N, N) of all components but the work
 
 
 @compiled

@@ -5,15 +5,14 @@ Before it the loop sets numbers and the initial state, after it it stores rows. 
 are the same bit for bit whichever points ran before it, and as those of ``simulate``.
 """
 
-from typing import Any, ClassVar
+from typing import Any
 
 import attrs
 
 from dap3d_core.assembly.arrays import UNSETTLED, System
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.stepping.integration_state import FINISHED, NOISE, RUNNING, Y
-from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
-from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays
+from dap3d_core.kernels.runtime.array_struct import Arrays, Matrix
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.study.batch.initial_state import LEAST_PIVOT, OPEN, STARTING
@@ -37,25 +36,19 @@ MIN_PIVOT = 1e-10
 class Points(Arrays):
     """k points of a model with n state components; w numbers change from point to point."""
 
-    types: ClassVar[dict[str, Any]] = {
-        **dict.fromkeys(("at", "places", "first_integer"), INTEGER_VECTOR),
-        **dict.fromkeys(("table", "y0", "metric", "rows", "diagnostics"), MATRIX),
-        **dict.fromkeys(("first_switches", "first_lengths"), MATRIX),
-    }
-
     at: Integers  # (4,)
     places: Integers  # (w,) indices in par, body, metric and constants of a tree, concatenated
-    table: Floats  # (k, w) the numbers at these indices
-    y0: Floats  # (k, n) states to start from
-    metric: Floats  # of the model, where its numbers do not change from point to point
+    table: Matrix  # (k, w) the numbers at these indices
+    y0: Matrix  # (k, n) states to start from
+    metric: Matrix  # of the model, where its numbers do not change from point to point
     unit: Floats  # (7,) constants of the metric of displacements at the start
     starting: Floats  # (STARTING + rows + n,) arguments and results of the start (initial_state.py)
     first_real: Floats  # the work as it is before a run
     first_integer: Integers
-    first_switches: Floats
-    first_lengths: Floats
-    rows: Floats  # (k nt, width) reported rows
-    diagnostics: Floats  # (k, COLUMNS)
+    first_switches: Matrix
+    first_lengths: Matrix
+    rows: Matrix  # (k nt, width) reported rows
+    diagnostics: Matrix  # (k, COLUMNS)
 
 
 @compiled

@@ -5,7 +5,7 @@ and the bits of its run alone. A lane whose run has ended takes the next point.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import attrs
 import numpy as np
@@ -33,8 +33,7 @@ from dap3d_core.integrators.stepping.integration_state import SAMPLE
 from dap3d_core.kernels.compiler.trace import TraceError
 from dap3d_core.kernels.compiler.types import INT, CompileError, Table, Tuple
 from dap3d_core.kernels.compiler.units import Entry
-from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
-from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays
+from dap3d_core.kernels.runtime.array_struct import Arrays, Matrix
 from dap3d_core.kernels.runtime.cache import compiled, jit_is_on
 from dap3d_core.kernels.runtime.function_lists import LOOP_LIST
 from dap3d_core.kernels.runtime.lanes import lane_count
@@ -64,22 +63,17 @@ MakeWorks = Callable[[int], Sequence[RungeKuttaState]]
 class LanePoints(Arrays):
     """Points in L lanes, and the numbers of a system that lanes have each for itself."""
 
-    types: ClassVar[dict[str, Any]] = {
-        **dict.fromkeys(("loaded", "point", "has", "places"), INTEGER_VECTOR),
-        **dict.fromkeys(("par", "body", "metric", "constants", "F", "smallest", "kept"), MATRIX),
-    }
-
     loaded: Integers  # (1,) the point whose numbers the system of one scene has
     point: Integers  # (L,) of each lane
     has: Integers  # functions of all lanes that there are (formulations/wide_rates.py)
-    par: Floats  # (numbers, L) each: parts of a system that differ from point to point
-    body: Floats
-    metric: Floats
-    constants: Floats
-    F: Floats
-    smallest: Floats
+    par: Matrix  # (numbers, L) each: parts of a system that differ from point to point
+    body: Matrix
+    metric: Matrix
+    constants: Matrix
+    F: Matrix
+    smallest: Matrix
     places: Integers  # (k,) in par, of what each run changes: states of angles
-    kept: Floats  # (L, k + settings) these, and settings
+    kept: Matrix  # (L, k + settings) these, and settings
 
 
 @compiled
