@@ -56,6 +56,7 @@ from dap3d_core.interface.formats import (
     total_inertia,
 )
 from dap3d_core.interface.types import SYMBOLS, BodyPose, pose
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.compiler import background, objects, units
 from dap3d_core.kernels.compiler.derivatives import differentiate
 from dap3d_core.kernels.compiler.functions import Program
@@ -77,10 +78,9 @@ from dap3d_core.kernels.compiler.types import (
 )
 from dap3d_core.kernels.runtime import ready, source_digest
 from dap3d_core.kernels.runtime.array_struct import (
-    INTEGERS,
-    MATRIX,
     VECTOR,
     Arrays,
+    Matrix,
     Scalar,
     pointer,
 )

@@ -8,7 +8,6 @@ import inspect
 import os
 import pkgutil
 import sys
-from typing import Any
 
 import attrs
 import numpy as np
@@ -27,6 +26,7 @@ from support.internals import (
     Compiled,
     CompileError,
     Differentiation,
+    Floats,
     Known,
     Program,
     Signature,
@@ -151,8 +151,8 @@ def compiled_type(value, parameter):
         return Table(value.signature)
     if is_code(value):
         return Known(value)
-    if isinstance(value, tuple) and all(map(callable, value)):
-        return Tuple(tuple(map(Known, value)))
+    if isinstance(value, tuple):
+        return Tuple(tuple(compiled_type(item, parameter) for item in value))
     if isinstance(value, complex):
         return COMPLEX
     type_ = units.type_of(value)
@@ -252,7 +252,7 @@ def differences(calls, levels=None, translated=None):
         if key not in wrappers:
             wrappers[key] = exported(translated, function, before, len(wrappers))
             signatures[wrappers[key][0]] = wrappers[key][1]
-        for table in (v for v in before if isinstance(v, PlainTable)):
+        for table in tables_in(before):
             for item in table:
                 if isinstance(item, Compiled) and item not in items:
                     items[item] = f"item_{len(items)}"
@@ -267,10 +267,14 @@ def differences(calls, levels=None, translated=None):
     found = set()
     for level, entries in made_at(program.module(), signatures, levels).items():
 
-        def compiled_table(table, level=level, entries=entries):
+        def with_tables(value, level=level, entries=entries):
+            if isinstance(value, tuple):
+                return tuple(map(with_tables, value))
+            if not isinstance(value, PlainTable):
+                return value
             made = (entries[items[f]] if isinstance(f, Compiled) else loops[id(f)][1][level]
-                    for f in table)  # fmt: skip
-            return units.Functions(table.signature, list(made))
+                    for f in value)  # fmt: skip
+            return units.Functions(value.signature, list(made))
 
         for function, before, after, result in calls:
             symbol, signature, variable = wrappers[function, tuple(map(kind, before))]
@@ -285,7 +289,7 @@ def differences(calls, levels=None, translated=None):
             by_array = zip(taken, entries[symbol].signature.arguments, strict=False)
             taken = [np.array([v], dtype=DTYPES[t.item]) if is_by_array(v, t) else v
                      for v, t in by_array]  # fmt: skip
-            taken = [compiled_table(v) if isinstance(v, PlainTable) else v for v in taken]
+            taken = list(map(with_tables, taken))
             if level == DIFFERENTIATED:
                 call_differentiated(entries[symbol], [*taken, out])
             else:
@@ -295,6 +299,15 @@ def differences(calls, levels=None, translated=None):
             if not all(same_numbers(one, other) for one, other in pairs):
                 found.add(f"{function.__module__}.{function.__name__} at {level}")
     return sorted(found)
+
+
+def tables_in(value):
+    """The tables of functions among arguments."""
+    if isinstance(value, PlainTable):
+        yield value
+    elif isinstance(value, tuple):
+        for item in value:
+            yield from tables_in(item)
 
 
 def is_by_array(value, type_):
@@ -358,7 +371,7 @@ def call_differentiated(entry, arguments):
 class Holder(Arrays):
     """A struct whose buffers others share."""
 
-    numbers: Any
+    numbers: Floats
 
 
 def kind(value):

@@ -4,14 +4,14 @@ Made from a model and its elimination plan (formulations/arrays.py). The arrays 
 address; the loops are an argument of their own (docs/decisions/0001).
 """
 
-from typing import Any, ClassVar
+from typing import Annotated, Any
 
 import attrs
 
 from dap3d_core.kernels.array_types import Floats as Floats
 from dap3d_core.kernels.array_types import Integers as Integers
 from dap3d_core.kernels.compiler.types import Table
-from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays
+from dap3d_core.kernels.runtime.array_struct import Arrays, IntegerMatrix, Matrix
 from dap3d_core.kernels.runtime.cache import compiled_into, table_of
 from dap3d_core.kernels.runtime.function_lists import LoopArrays, step_signature
 from dap3d_core.model.state_layout import COORDINATES, STATE, VELOCITIES
@@ -50,18 +50,13 @@ class KeptRowArrays(Arrays):
     are kept.
     """
 
-    types: ClassVar[dict[str, Any]] = {
-        "call_counts": INTEGERS,
-        **dict.fromkeys(("calls", "cuts", "ends", "ways", "pairs", "profile"), INTEGER_MATRIX),
-    }
-
-    calls: Integers  # (calls, 4) loop, i0, p0, count: of accelerations, then of positions
+    calls: IntegerMatrix  # (calls, 4) loop, i0, p0, count: of accelerations, then of positions
     call_counts: Integers  # (2,) calls of each of the two
-    cuts: Integers  # (joints, CUT_WIDTH)
-    ends: Integers  # (ends, END_WIDTH) bodies of the joints
-    ways: Integers  # (steps, STEP_WIDTH) nodes that a joint's loads pass, children before parents
-    pairs: Integers  # (pairs, PAIR_WIDTH) joints whose loads meet at a node
-    profile: Integers  # (m, 2) first row that a row couples with; place of the row in ``matrix``
+    cuts: IntegerMatrix  # (joints, CUT_WIDTH)
+    ends: IntegerMatrix  # (ends, END_WIDTH) bodies of the joints
+    ways: IntegerMatrix  # (steps, STEP_WIDTH) nodes that a joint's loads pass, children first
+    pairs: IntegerMatrix  # (pairs, PAIR_WIDTH) joints whose loads meet at a node
+    profile: IntegerMatrix  # (m, 2) first row that a row couples with; its place in ``matrix``
     D: Floats  # as ``System.D``, along global axes; of the kept rows alone
     loads: Floats  # what loads do along the freedoms of the nodes that they pass
     carried: Floats  # (6 rows steps,) scratch: loads of one joint on their way
@@ -80,50 +75,23 @@ class KeptRowArrays(Arrays):
 class TreeArrays(Arrays):
     """Arrays of a tree; their columns are those of formulations/joint/node_layout.py."""
 
-    types: ClassVar[dict[str, Any]] = {
-        **dict.fromkeys(("nodes", "joints"), INTEGER_MATRIX),
-        **dict.fromkeys(("places", "half_angles"), MATRIX),
-        "kept": KeptRowArrays.type_of(),
-    }
-
-    nodes: Integers  # (nodes, TREE_WIDTH), ground first
-    joints: Integers  # (joints, JOINT_WIDTH), children before parents
-    places: Floats  # (n+1+massless, BODY_WIDTH): ``System.body``, then massless nodes
+    nodes: IntegerMatrix  # (nodes, TREE_WIDTH), ground first
+    joints: IntegerMatrix  # (joints, JOINT_WIDTH), children before parents
+    places: Matrix  # (n+1+massless, BODY_WIDTH): ``System.body``, then massless nodes
     constants: Floats  # (nodes * CONSTANT_WIDTH,)
     work: Floats  # (nodes * WORK_WIDTH,)
-    half_angles: Floats  # (2, revolutes) sine and cosine of q/2
+    half_angles: Matrix  # (2, revolutes) sine and cosine of q/2
     scratch: Floats  # (48,) of one joint
     force: Floats  # (6 (n+1),) applied forces with friction
     slope: Floats  # (state,) rates that nobody reads
-    kept: Any = None  # KeptRowArrays, where rows are kept on the tree
+    kept: Annotated[Any, KeptRowArrays] = None  # where rows are kept on the tree
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
 class System(LoopArrays):
     """Arrays of the driver. n bodies, ground is 0; rows in the order of the plan."""
 
-    types: ClassVar[dict[str, Any]] = LoopArrays.types | {
-        "metric": MATRIX,
-        **dict.fromkeys(("kinds", "row"), INTEGERS),
-        **dict.fromkeys(
-            (
-                "groups",
-                "blocks",
-                "targets",
-                "contributions",
-                "nodes",
-                "columns",
-                "updates",
-                "hubs",
-                "turns",
-                "contacts",
-            ),
-            INTEGER_MATRIX,
-        ),
-        "tree": TreeArrays.type_of(),
-    }
-
-    metric: Floats  # (n+1, METRIC_WIDTH): 1/sqrt(m); U = L^-T, upper triangle; B = A U; w'; by rows
+    metric: Matrix  # (n+1, METRIC_WIDTH): 1/sqrt(m); U = L^-T, upper triangle; B = A U; w'; by rows
     force: Floats  # (6 (n+1),) applied force and moment on each body, global axes
     acceleration: Floats  # (6 (n+1),) scaled; until it is solved for, the scaled forces
     velocity: Floats  # (6 (n+1),) scaled
@@ -142,19 +110,19 @@ class System(LoopArrays):
     settings: Floats  # (SETTINGS,) see above
     friction: Floats  # where forces depend on multipliers (common/friction.py: memory_size)
     watched: Floats  # of contacts: t, y, dy/dt where switches were read (contacts/equations.py)
-    groups: Integers  # (loops, 3) i0, p0, count
+    groups: IntegerMatrix  # (loops, 3) i0, p0, count
     kinds: Integers  # (KINDS + 1,) first loop of each kind
     row: Integers  # (model rows,) place of each constraint row in the row vectors
-    blocks: Integers  # from here on as in linear.Plan
-    targets: Integers
-    contributions: Integers
-    nodes: Integers
-    columns: Integers
-    updates: Integers
-    hubs: Integers
-    turns: Integers  # (angles of joints, COLUMNS) as in assembly/turns.py
-    contacts: Integers  # (contacts, COLUMNS) as in formulations/contacts/equations.py
-    tree: Any = None  # TreeArrays, where the state is that of a tree in joint coordinates
+    blocks: IntegerMatrix  # from here on as in linear.Plan
+    targets: IntegerMatrix
+    contributions: IntegerMatrix
+    nodes: IntegerMatrix
+    columns: IntegerMatrix
+    updates: IntegerMatrix
+    hubs: IntegerMatrix
+    turns: IntegerMatrix  # (angles of joints, COLUMNS) as in assembly/turns.py
+    contacts: IntegerMatrix  # (contacts, COLUMNS) as in formulations/contacts/equations.py
+    tree: Annotated[Any, TreeArrays] = None  # where the state is that of a tree
 
 
 #: Part of the state of a run: ``par`` holds the turns of angles and the numbers that an

@@ -6,8 +6,8 @@ Reentrant polygon clipping (1974).
 
 import math
 
-from dap3d_core.assembly.collisions.records import add
-from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.assembly.collisions.placed_shapes import CORNERS, PlacedShapes, add
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: Length^2 of the product of two directions of edges below which they are parallel.
@@ -16,8 +16,6 @@ PARALLEL = 1e-8
 BETTER = 1e-6
 #: Part of the size within which a point lies on the border of a face.
 BORDER = 1e-9
-#: Rows of scratch of two polygons: corners, at most 8 each.
-CORNERS = 16
 
 
 @compiled
@@ -27,35 +25,30 @@ def dot_axis(u: Floats, k: int, x: float, y: float, z: float) -> float:
 
 
 @compiled
-def apart(
-    i: int, j: int, x: float, y: float, z: float, centre: Floats, axes: Floats, size: Floats
-) -> float:
+def apart(shapes: PlacedShapes, i: int, j: int, x: float, y: float, z: float) -> float:
     """Distance of two boxes along a unit vector, negative where they overlap there."""
     r = 0.0
     for k in range(3):
-        r += size[i, k] * abs(dot_axis(axes[i], k, x, y, z))
-        r += size[j, k] * abs(dot_axis(axes[j], k, x, y, z))
-    d, e = centre[i], centre[j]
+        r += shapes.size[i, k] * abs(dot_axis(shapes.axes[i], k, x, y, z))
+        r += shapes.size[j, k] * abs(dot_axis(shapes.axes[j], k, x, y, z))
+    d, e = shapes.centre[i], shapes.centre[j]
     return abs((d[0] - e[0]) * x + (d[1] - e[1]) * y + (d[2] - e[2]) * z) - r
 
 
 @compiled
-def boxes(
-    which: Integers, found: Floats, count: int, i: int, j: int,
-    centre: Floats, axes: Floats, size: Floats, polygon: Floats, most: float,
-) -> int:  # fmt: skip
-    """Boxes i and j; polygon: (CORNERS, 3) scratch."""
-    best, axis = -1e300, 0
+def boxes(shapes: PlacedShapes, count: int, i: int, j: int) -> int:
+    """Boxes i and j."""
+    best, axis, most = -1e300, 0, shapes.near[i] + shapes.near[j]
     for k in range(6):
-        u = axes[i] if k < 3 else axes[j]
-        gap = apart(i, j, u[k % 3], u[3 + k % 3], u[6 + k % 3], centre, axes, size)
-        if gap > best + BORDER * size[i, 0]:
+        u = shapes.axes[i] if k < 3 else shapes.axes[j]
+        gap = apart(shapes, i, j, u[k % 3], u[3 + k % 3], u[6 + k % 3])
+        if gap > best + BORDER * shapes.size[i, 0]:
             best, axis = gap, k
         if gap > most:
             return count
-    u, w = axes[i], axes[j]
+    u, w = shapes.axes[i], shapes.axes[j]
     ex, ey, ez, edges = 0.0, 0.0, 0.0, -1
-    across = best + BETTER * (size[i, 0] + size[j, 0])
+    across = best + BETTER * (shapes.size[i, 0] + shapes.size[j, 0])
     for k in range(9):
         a, b = k // 3, k % 3
         x = u[3 + a] * w[6 + b] - u[6 + a] * w[3 + b]
@@ -65,81 +58,77 @@ def boxes(
         if length > PARALLEL:
             length = math.sqrt(length)
             x, y, z = x / length, y / length, z / length
-            gap = apart(i, j, x, y, z, centre, axes, size)
+            gap = apart(shapes, i, j, x, y, z)
             if gap > most:
                 return count
             if gap > across:
                 across, edges, ex, ey, ez = gap, k, x, y, z
     if edges >= 0:
-        return _edges(which, found, count, i, j, edges, ex, ey, ez, across,
-                      centre, axes, size, most)  # fmt: skip
+        return _edges(shapes, count, i, j, edges, ex, ey, ez, across)
     if axis < 3:
-        return _face(which, found, count, i, j, i, j, axis, centre, axes, size, polygon, most)
-    return _face(which, found, count, i, j, j, i, axis - 3, centre, axes, size, polygon, most)
+        return _face(shapes, count, i, j, i, j, axis)
+    return _face(shapes, count, i, j, j, i, axis - 3)
 
 
 @compiled
 def _edges(
-    which: Integers, found: Floats, count: int, i: int, j: int, pair: int,
-    x: float, y: float, z: float, gap: float,
-    centre: Floats, axes: Floats, size: Floats, most: float,
+    shapes: PlacedShapes, count: int, i: int, j: int, pair: int, x: float, y: float, z: float,
+    gap: float,
 ) -> int:  # fmt: skip
     """Where two edges pass each other, along their common normal (x, y, z)."""
-    d, e, u, w, a, b = centre[i], centre[j], axes[i], axes[j], pair // 3, pair % 3
+    d, e, u, w = shapes.centre[i], shapes.centre[j], shapes.axes[i], shapes.axes[j]
+    a, b = pair // 3, pair % 3
     if (d[0] - e[0]) * x + (d[1] - e[1]) * y + (d[2] - e[2]) * z < 0.0:
         x, y, z = -x, -y, -z
     # middles of the edges: of box i the one towards j, of box j the one towards i
     px, py, pz, qx, qy, qz = d[0], d[1], d[2], e[0], e[1], e[2]
     for k in range(3):
         if k != a:
-            s = -size[i, k] if dot_axis(u, k, x, y, z) > 0.0 else size[i, k]
+            s = -shapes.size[i, k] if dot_axis(u, k, x, y, z) > 0.0 else shapes.size[i, k]
             px, py, pz = px + s * u[k], py + s * u[3 + k], pz + s * u[6 + k]
         if k != b:
-            s = size[j, k] if dot_axis(w, k, x, y, z) > 0.0 else -size[j, k]
+            s = shapes.size[j, k] if dot_axis(w, k, x, y, z) > 0.0 else -shapes.size[j, k]
             qx, qy, qz = qx + s * w[k], qy + s * w[3 + k], qz + s * w[6 + k]
     rx, ry, rz = px - qx, py - qy, pz - qz
     c = u[a] * w[b] + u[3 + a] * w[3 + b] + u[6 + a] * w[6 + b]
     t = (dot_axis(w, b, rx, ry, rz) - c * dot_axis(u, a, rx, ry, rz)) / (1.0 - c * c)
-    return add(which, found, count, i, j, 100 + pair, qx + t * w[b], qy + t * w[3 + b],
-               qz + t * w[6 + b], x, y, z, gap, most)  # fmt: skip
+    return add(shapes, count, i, j, 100 + pair, qx + t * w[b], qy + t * w[3 + b],
+               qz + t * w[6 + b], x, y, z, gap)  # fmt: skip
 
 
 @compiled
 def _face(
-    which: Integers, found: Floats, count: int, i: int, j: int, owner: int, other: int, axis: int,
-    centre: Floats, axes: Floats, size: Floats, polygon: Floats, most: float,
-) -> int:  # fmt: skip
+    shapes: PlacedShapes, count: int, i: int, j: int, owner: int, other: int, axis: int
+) -> int:
     """The face of box ``other`` that looks at a face of ``owner``, clipped to that."""
-    d, u, e = centre[owner], axes[owner], centre[other]
+    d, u, e = shapes.centre[owner], shapes.axes[owner], shapes.centre[other]
     side = dot_axis(u, axis, e[0] - d[0], e[1] - d[1], e[2] - d[2])
     side = 1.0 if side >= 0.0 else -1.0
     nx, ny, nz = side * u[axis], side * u[3 + axis], side * u[6 + axis]
-    corners = _facing(other, nx, ny, nz, centre, axes, size, polygon)
-    border = BORDER * (size[owner, 0] + size[owner, 1] + size[owner, 2])
+    _put_facing(shapes, other, nx, ny, nz)
+    corners, polygon = 4, shapes.scratch
+    border = BORDER * (shapes.size[owner, 0] + shapes.size[owner, 1] + shapes.size[owner, 2])
     for k in range(4):
         across = (axis + 1 + k // 2) % 3
         sign = 2.0 * (k % 2) - 1.0
         x, y, z = sign * u[across], sign * u[3 + across], sign * u[6 + across]
-        limit = size[owner, across] + d[0] * x + d[1] * y + d[2] * z
+        limit = shapes.size[owner, across] + d[0] * x + d[1] * y + d[2] * z
         corners = _clip(polygon, corners, x, y, z, limit, border)
-    level = size[owner, axis] + d[0] * nx + d[1] * ny + d[2] * nz
+    level = shapes.size[owner, axis] + d[0] * nx + d[1] * ny + d[2] * nz
     sign = 1.0 if owner == j else -1.0
     for k in range(corners):
         p = polygon[k]
         gap = p[0] * nx + p[1] * ny + p[2] * nz - level
         back = gap if owner == j else 0.0  # the point on the surface of shape j
-        count = add(which, found, count, i, j, 16 * axis + k, p[0] - back * nx, p[1] - back * ny,
-                    p[2] - back * nz, sign * nx, sign * ny, sign * nz, gap, most)  # fmt: skip
+        count = add(shapes, count, i, j, 16 * axis + k, p[0] - back * nx, p[1] - back * ny,
+                    p[2] - back * nz, sign * nx, sign * ny, sign * nz, gap)  # fmt: skip
     return count
 
 
 @compiled
-def _facing(
-    box: int, nx: float, ny: float, nz: float,
-    centre: Floats, axes: Floats, size: Floats, polygon: Floats,
-) -> int:  # fmt: skip
-    """Put the corners of the face that is turned most against a normal; their number."""
-    d, u, h, best, face = centre[box], axes[box], size[box], -1.0, 0
+def _put_facing(shapes: PlacedShapes, box: int, nx: float, ny: float, nz: float) -> None:
+    """Put the four corners of the face that is turned most against a normal."""
+    d, u, h, best, face = shapes.centre[box], shapes.axes[box], shapes.size[box], -1.0, 0
     for k in range(3):
         turned = abs(dot_axis(u, k, nx, ny, nz))
         if turned > best + BORDER:
@@ -150,8 +139,8 @@ def _facing(
         p = h[a] if k == 0 or k == 3 else -h[a]
         q = h[b] if k < 2 else -h[b]
         for c in range(3):
-            polygon[k, c] = d[c] + s * u[3 * c + face] + p * u[3 * c + a] + q * u[3 * c + b]
-    return 4
+            x = d[c] + s * u[3 * c + face] + p * u[3 * c + a] + q * u[3 * c + b]
+            shapes.scratch[k, c] = x
 
 
 @compiled

@@ -12,17 +12,22 @@ import math
 
 from dap3d_core.assembly.collisions.boxes import dot_axis
 from dap3d_core.assembly.collisions.distance import APART, FAR_APART, A, B, V, dot, nearest
-from dap3d_core.assembly.collisions.manifold import E1, E2, POLYGON, put_points, tangents
-from dap3d_core.assembly.collisions.supports import FLAT, curvature, radius_of, support
-from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.assembly.collisions.manifold import E1, E2, put_points, tangents
+from dap3d_core.assembly.collisions.placed_shapes import PlacedShapes
+from dap3d_core.assembly.collisions.supports import (
+    FLAT,
+    curvature,
+    extent_of,
+    radius_of,
+    support,
+)
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.scene.contacts.collision_shapes import BOX, CAPSULE, CYLINDER, HULL, PLANE
 
 #: Rows of scratch behind those of ``nearest``: directions tried and found, start, points, a step,
 #: edges of i and j.
 N, BEST, START, PI, PJ, STEP, EI, EJ = 16, 17, 18, 19, 20, 21, 22, 29
-#: Edges of a solid that there is room for; rows of scratch of all.
-EDGES, ROWS = 7, POLYGON + 80
 #: Parts of the sizes by which a direction has to be better.
 BETTER = 1e-14
 #: Rounds of Newton's method, halvings of a step.
@@ -32,13 +37,11 @@ ALL, NEARLY, LESS, HALF = 1.0, 0.999, 0.95, 0.5
 
 
 @compiled
-def gap_along(
-    i: int, j: int, n: Floats, kind: Integers, centre: Floats, axes: Floats, size: Floats,
-    corners: Integers, vertices: Floats, work: Floats,
-) -> float:  # fmt: skip
+def gap_along(shapes: PlacedShapes, i: int, j: int, n: Floats) -> float:
     """Gap of the cores of solids along n; puts their points there."""
-    support(i, -1.0, n, kind, centre, axes, size, corners, vertices, work[PI])
-    support(j, 1.0, n, kind, centre, axes, size, corners, vertices, work[PJ])
+    work = shapes.work
+    support(shapes, i, -1.0, n, work[PI])
+    support(shapes, j, 1.0, n, work[PJ])
     p, q = work[PI], work[PJ]
     return n[0] * (p[0] - q[0]) + n[1] * (p[1] - q[1]) + n[2] * (p[2] - q[2])
 
@@ -62,18 +65,16 @@ def cross(a: Floats, b: Floats, out: Floats) -> None:
 
 
 @compiled
-def attempt(
-    i: int, j: int, best: float, better: float, kind: Integers, centre: Floats, axes: Floats,
-    size: Floats, corners: Integers, vertices: Floats, work: Floats,
-) -> float:  # fmt: skip
+def attempt(shapes: PlacedShapes, i: int, j: int, best: float, better: float) -> float:
     """Try the direction N and its opposite; the gap of the better one so far."""
+    work = shapes.work
     n = work[N]
     if not unit(n):
         return best
     for _ in range(2):
         for k in range(3):
             n[k] = -n[k]
-        s = gap_along(i, j, n, kind, centre, axes, size, corners, vertices, work)
+        s = gap_along(shapes, i, j, n)
         if s > best + better:
             best = s
             for k in range(3):
@@ -82,16 +83,15 @@ def attempt(
 
 
 @compiled
-def edges_of(
-    i: int, kind: Integers, axes: Floats, points: int, count: int, work: Floats, out: int
-) -> int:
+def edges_of(shapes: PlacedShapes, i: int, points: int, count: int, out: int) -> int:
     """Put unit directions of the edges of a solid near its corners in the simplex; their number."""
-    what, found = kind[i], 0
+    work = shapes.work
+    what, found = shapes.kind[i], 0
     if what in (BOX, CYLINDER, CAPSULE):
         for k in range(3 if what == BOX else 1):
             along = k if what == BOX else 2
             for r in range(3):
-                work[out + found, r] = axes[i, 3 * r + along]
+                work[out + found, r] = shapes.axes[i, 3 * r + along]
             found += 1
     elif what == HULL:
         for a in range(count):
@@ -104,26 +104,22 @@ def edges_of(
 
 
 @compiled
-def bend(
-    i: int, j: int, n: Floats, s: Floats, t: Floats, kind: Integers, axes: Floats, size: Floats
-) -> float:
+def bend(shapes: PlacedShapes, i: int, j: int, n: Floats, s: Floats, t: Floats) -> float:
     """``curvature`` of both solids."""
-    return curvature(i, n, s, t, kind, axes, size) + curvature(j, n, s, t, kind, axes, size)
+    return curvature(shapes, i, n, s, t) + curvature(shapes, j, n, s, t)
 
 
 @compiled
-def climb(
-    i: int, j: int, edge: int, best: float, better: float, kind: Integers, centre: Floats,
-    axes: Floats, size: Floats, corners: Integers, vertices: Floats, work: Floats,
-) -> float:  # fmt: skip
+def climb(shapes: PlacedShapes, i: int, j: int, edge: int, best: float, better: float) -> float:
     """Newton's method for the largest gap from START on, across an edge in row ``edge`` or none."""
+    work = shapes.work
     n, p, q, t1, t2 = work[N], work[PI], work[PJ], work[E1], work[E2]
     along = dot(work[START], work[edge]) if edge >= 0 else 0.0
     for k in range(3):
         n[k] = work[START, k] - (along * work[edge, k] if edge >= 0 else 0.0)
     if not unit(n):
         return best
-    s = gap_along(i, j, n, kind, centre, axes, size, corners, vertices, work)
+    s = gap_along(shapes, i, j, n)
     least = 1e300
     for _ in range(ROUNDS):
         tangents(n, work)
@@ -134,10 +130,10 @@ def climb(
         for k in range(3):
             g1, g2 = g1 + t1[k] * (p[k] - q[k]), g2 + t2[k] * (p[k] - q[k])
             work[V, k] = n[k]
-        a, b, d = s + bend(i, j, n, t1, t1, kind, axes, size), 0.0, 1.0
+        a, b, d = s + bend(shapes, i, j, n, t1, t1), 0.0, 1.0
         if edge < 0:
-            b = bend(i, j, n, t1, t2, kind, axes, size)
-            d = s + bend(i, j, n, t2, t2, kind, axes, size)
+            b = bend(shapes, i, j, n, t1, t2)
+            d = s + bend(shapes, i, j, n, t2, t2)
         else:
             g2 = 0.0
         slope, det = math.sqrt(g1 * g1 + g2 * g2), a * d - b * b
@@ -156,7 +152,7 @@ def climb(
             for k in range(3):
                 n[k] = work[V, k] + part * work[STEP, k]
             if unit(n):
-                new = gap_along(i, j, n, kind, centre, axes, size, corners, vertices, work)
+                new = gap_along(shapes, i, j, n)
             if new >= s - better:
                 break
             part *= 0.5
@@ -165,136 +161,117 @@ def climb(
                 n[k] = work[V, k]
             break
         s, least = new, slope if new <= s + better else 1e300
-    return attempt(i, j, best, better, kind, centre, axes, size, corners, vertices, work)
+    return attempt(shapes, i, j, best, better)
 
 
 @compiled
 def flat_directions(
-    i: int, j: int, edges_i: int, edges_j: int, count: int, best: float, better: float,
-    kind: Integers, centre: Floats, axes: Floats, size: Floats, corners: Integers,
-    vertices: Floats, work: Floats,
+    shapes: PlacedShapes, i: int, j: int, edges_i: int, edges_j: int, count: int, best: float,
+    better: float,
 ) -> float:  # fmt: skip
     """Try normals of faces of hulls, and of pairs of edges."""
+    work = shapes.work
     for side in range(2):
         k, first, edges = (i, EI, edges_i) if side == 0 else (j, EJ, edges_j)
-        for e in range(edges if kind[k] == HULL else 0):
+        for e in range(edges if shapes.kind[k] == HULL else 0):
             for f in range(e + 1, edges):
                 cross(work[first + e], work[first + f], work[N])
                 if dot(work[N], work[N]) > FLAT:
-                    best = attempt(i, j, best, better, kind, centre, axes, size, corners,
-                                   vertices, work)  # fmt: skip
+                    best = attempt(shapes, i, j, best, better)
     for e in range(edges_i):
         for f in range(edges_j):
             cross(work[EI + e], work[EJ + f], work[N])
             if dot(work[N], work[N]) > FLAT:
-                best = attempt(
-                    i, j, best, better, kind, centre, axes, size, corners, vertices, work
-                )
+                best = attempt(shapes, i, j, best, better)
     return best
 
 
 @compiled
-def own_faces(
-    i: int, j: int, better: float, kind: Integers, centre: Floats, axes: Floats, size: Floats,
-    corners: Integers, vertices: Floats, work: Floats,
-) -> tuple[float, bool]:  # fmt: skip
+def own_faces(shapes: PlacedShapes, i: int, j: int, better: float) -> tuple[float, bool]:
     """Try normals of faces of boxes and cylinders; the gap, and whether none can be larger.
 
     None is where the nearest point of the other solid lies over the face, or in the solid and
     nearest to this face: along any direction the gap is that of the point at most.
     """
+    work = shapes.work
     best, side, along = -1e300, 0, 2
     for one in range(2):
         k = i if one == 0 else j
-        for e in range(0 if kind[k] == BOX else 2, 3 if kind[k] in (BOX, CYLINDER) else 0):
+        kind = shapes.kind[k]
+        for e in range(0 if kind == BOX else 2, 3 if kind in (BOX, CYLINDER) else 0):
             for r in range(3):
-                work[N, r] = axes[k, 3 * r + e]
-            new = attempt(i, j, best, better, kind, centre, axes, size, corners, vertices, work)
+                work[N, r] = shapes.axes[k, 3 * r + e]
+            new = attempt(shapes, i, j, best, better)
             if new > best:
                 best, side, along = new, one, e
     if best == -1e300:
         return best, False
     k, deep, p, q = j if side else i, max(0.0, -best), work[PI], work[PJ]
-    support(i + j - k, 1.0 - 2.0 * side, work[BEST], kind, centre, axes, size, corners, vertices, p)
+    support(shapes, i + j - k, 1.0 - 2.0 * side, work[BEST], p)
     for r in range(3):
-        q[r] = p[r] - centre[k, r]
+        q[r] = p[r] - shapes.centre[k, r]
     x, y, z = q[0], q[1], q[2]
     for r in range(3):
-        q[r] = abs(dot_axis(axes[k], r, x, y, z))
-    if kind[k] == CYLINDER:
-        over = math.sqrt(q[0] * q[0] + q[1] * q[1]) <= size[k, 0] - deep
-        return best, over and deep <= size[k, 1]
-    over = deep <= size[k, along]
+        q[r] = abs(dot_axis(shapes.axes[k], r, x, y, z))
+    if shapes.kind[k] == CYLINDER:
+        over = math.sqrt(q[0] * q[0] + q[1] * q[1]) <= shapes.size[k, 0] - deep
+        return best, over and deep <= shapes.size[k, 1]
+    over = deep <= shapes.size[k, along]
     for r in range(3):
-        over = over and (r == along or q[r] <= size[k, r] - deep)
+        over = over and (r == along or q[r] <= shapes.size[k, r] - deep)
     return best, over
 
 
 @compiled
-def part_best(
-    i: int, j: int, most: float, kind: Integers, centre: Floats, axes: Floats, size: Floats,
-    corners: Integers, vertices: Floats, work: Floats,
-) -> float:  # fmt: skip
+def part_best(shapes: PlacedShapes, i: int, j: int, most: float) -> float:
     """Put the direction of the largest gap of cores into BEST; the gap, or one beyond ``most``."""
+    work = shapes.work
     count, status = 0, 0
-    better = BETTER * (math.sqrt(dot(size[i], size[i])) + math.sqrt(dot(size[j], size[j])))
-    best, is_largest = own_faces(i, j, better, kind, centre, axes, size, corners, vertices, work)
+    better = BETTER * (extent_of(shapes, i) + extent_of(shapes, j))
+    best, is_largest = own_faces(shapes, i, j, better)
     if is_largest:
         return best
     for turn in range(4):
         part = ALL if turn == 0 else NEARLY if turn == 1 else LESS if turn == 2 else HALF
         far = most if turn == 0 else 1e300
-        status, count = nearest(i, j, part, far, kind, centre, axes, size, corners, vertices, work)
+        status, count = nearest(shapes, i, j, part, far)
         if status == FAR_APART:
             return 1e300
         if status == APART:
             break
     for k in range(3):
-        way = work[V, k] if status == APART else centre[i, k] - centre[j, k]
+        way = work[V, k] if status == APART else shapes.centre[i, k] - shapes.centre[j, k]
         work[START, k] = way
     if not unit(work[START]):
         work[START, 2] = 1.0
-    edges_i = edges_of(i, kind, axes, A, count, work, EI)
-    edges_j = edges_of(j, kind, axes, B, count, work, EJ)
-    best = flat_directions(i, j, edges_i, edges_j, count, best, better, kind, centre, axes, size,
-                           corners, vertices, work)  # fmt: skip
+    edges_i = edges_of(shapes, i, A, count, EI)
+    edges_j = edges_of(shapes, j, B, count, EJ)
+    best = flat_directions(shapes, i, j, edges_i, edges_j, count, best, better)
     for side in range(2):
         for e in range(edges_i if side == 0 else edges_j):
             edge = (EI if side == 0 else EJ) + e
-            best = climb(
-                i, j, edge, best, better, kind, centre, axes, size, corners, vertices, work
-            )
-    return climb(i, j, -1, best, better, kind, centre, axes, size, corners, vertices, work)
+            best = climb(shapes, i, j, edge, best, better)
+    return climb(shapes, i, j, -1, best, better)
 
 
 @compiled
-def touch_convex(
-    i: int, j: int, kind: Integers, centre: Floats, axes: Floats, size: Floats, corners: Integers,
-    vertices: Floats, margin: Floats, work: Floats, which: Integers, found: Floats, count: int,
-) -> int:  # fmt: skip
+def touch_convex(shapes: PlacedShapes, i: int, j: int, count: int) -> int:
     """Append the points of shapes i and j for which there is no formula; the new count.
 
-    Args:
-        i, j: two shapes, of which i has the higher kind.
-        kind, size, corners, vertices: of all shapes, as in ``CollisionShapes``.
-        centre, axes: (m, 3), (m, 9) m, rows of the matrices of their axes.
-        margin: (m,) m; points nearer than the sum of both are found.
-        work: (ROWS, 3) scratch.
-        which, found: outputs, as in records.py.
-        count: of points that there are already.
+    i is the one of the higher kind.
     """
-    radius, most = radius_of(i, kind, size), margin[i] + margin[j]
-    if kind[j] == PLANE:
+    work = shapes.work
+    radius, most = radius_of(shapes, i), shapes.near[i] + shapes.near[j]
+    if shapes.kind[j] == PLANE:
         for r in range(3):
-            work[BEST, r] = axes[j, 3 * r + 2]
-        support(i, -1.0, work[BEST], kind, centre, axes, size, corners, vertices, work[PI])
+            work[BEST, r] = shapes.axes[j, 3 * r + 2]
+        support(shapes, i, -1.0, work[BEST], work[PI])
         for r in range(3):
-            work[PJ, r] = work[PI, r] - centre[j, r]
+            work[PJ, r] = work[PI, r] - shapes.centre[j, r]
         gap = dot(work[PJ], work[BEST]) - radius
     else:
-        radius += radius_of(j, kind, size)
-        gap = part_best(i, j, most, kind, centre, axes, size, corners, vertices, work) - radius
+        radius += radius_of(shapes, j)
+        gap = part_best(shapes, i, j, most) - radius
     if gap >= most:
         return count
-    return put_points(i, j, gap, most, kind, centre, axes, size, corners, vertices, work,
-                      work[BEST], which, found, count)  # fmt: skip
+    return put_points(shapes, i, j, gap, work[BEST], count)

@@ -6,8 +6,9 @@ objects (1988). Nearest points of simplices are found by trying all faces of the
 
 import math
 
+from dap3d_core.assembly.collisions.placed_shapes import PlacedShapes
 from dap3d_core.assembly.collisions.supports import radius_of, support
-from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: Rows of scratch: points of solids i and j, their differences; from j to i; weights, best and
@@ -115,36 +116,32 @@ def _scaled(work: Floats, row: int, centre: Floats, part: float) -> None:
 
 
 @compiled
-def nearest(
-    i: int, j: int, part: float, most: float, kind: Integers, centre: Floats, axes: Floats,
-    size: Floats, corners: Integers, vertices: Floats, work: Floats,
-) -> tuple[int, int]:  # fmt: skip
-    """How solids i and j lie, and the corners of their nearest simplex, in ``work``.
+def nearest(shapes: PlacedShapes, i: int, j: int, part: float, most: float) -> tuple[int, int]:
+    """How solids i and j lie, and the corners of their nearest simplex, in scratch.
 
     Args:
         i, j: solids.
         part: that they are taken of, about their centres.
         most: m, distance beyond which they are far apart.
-        kind, centre, axes, size, corners, vertices: of all, as of ``touch``.
-        work: scratch, rows as above.
     """
-    v, n, count = work[V], work[UNIT], 0
+    work, count = shapes.work, 0
+    v, n = work[V], work[UNIT]
     for k in range(3):
-        v[k] = centre[i, k] - centre[j, k]
+        v[k] = shapes.centre[i, k] - shapes.centre[j, k]
     if dot(v, v) == 0.0:
         v[2] = 1.0
-    radii = radius_of(i, kind, size) + radius_of(j, kind, size)
-    reach = dot(size[i], size[i]) + dot(size[j], size[j])
+    radii = radius_of(shapes, i) + radius_of(shapes, j)
+    reach = dot(shapes.size[i], shapes.size[i]) + dot(shapes.size[j], shapes.size[j])
     for _ in range(ROUNDS):
         length = math.sqrt(dot(v, v))
         if count and length * length <= CLOSE * CLOSE * reach:
             return INSIDE, count
         for k in range(3):
             n[k] = v[k] / length
-        support(i, -1.0, n, kind, centre, axes, size, corners, vertices, work[A + count])
-        support(j, 1.0, n, kind, centre, axes, size, corners, vertices, work[B + count])
-        _scaled(work, A + count, centre[i], part)
-        _scaled(work, B + count, centre[j], part)
+        support(shapes, i, -1.0, n, work[A + count])
+        support(shapes, j, 1.0, n, work[B + count])
+        _scaled(work, A + count, shapes.centre[i], part)
+        _scaled(work, B + count, shapes.centre[j], part)
         w = work[W + count]
         for k in range(3):
             w[k] = work[A + count, k] - work[B + count, k]

@@ -3,7 +3,7 @@
 Pairs that may touch come from a grid of cells, and of the few larger shapes one by one.
 """
 
-from dap3d_core.assembly.collisions.boxes import CORNERS, boxes
+from dap3d_core.assembly.collisions.boxes import boxes
 from dap3d_core.assembly.collisions.convex import touch_convex
 from dap3d_core.assembly.collisions.placed_shapes import PlacedShapes, place_shapes
 from dap3d_core.assembly.collisions.solids import (
@@ -178,29 +178,25 @@ def has_formula(a: int, b: int) -> bool:
 @compiled
 def touch(s: PlacedShapes, i: int, j: int, count: int) -> int:
     """Append points of shapes i and j nearer than the sum of what is near; the new count."""
-    which, found, centre, axes, size = s.which, s.found, s.centre, s.axes, s.size
-    if not has_formula(s.kind[i], s.kind[j]):
-        return touch_convex(i, j, s.kind, centre, axes, size, s.corners, s.vertices, s.near,
-                            s.work, which, found, count)  # fmt: skip
-    q, n, a, b, most = s.scratch[CORNERS], s.scratch[CORNERS + 1], s.kind[i], s.kind[j], 0.0
-    most, c, d = s.near[i] + s.near[j], centre[i], centre[j]
+    a, b, c, d = s.kind[i], s.kind[j], s.centre[i], s.centre[j]
+    if not has_formula(a, b):
+        return touch_convex(s, i, j, count)
     if b == PLANE:
-        return at_plane(which, found, count, i, j, a, centre, axes, size, most)
+        return at_plane(s, count, i, j)
     if a == SPHERE:
-        return balls(which, found, count, i, j, 0, c[0], c[1], c[2], size[i, 0],
-                     d[0], d[1], d[2], size[j, 0], most)  # fmt: skip
+        return balls(s, count, i, j, 0, c[0], c[1], c[2], s.size[i, 0], d[0], d[1], d[2],
+                     s.size[j, 0])  # fmt: skip
     if a == CAPSULE and b == SPHERE:
-        return sphere_capsule(which, found, count, i, j, centre, axes, size, most)
+        return sphere_capsule(s, count, i, j)
     if a == CAPSULE:
-        return capsules(which, found, count, i, j, centre, axes, size, most)
+        return capsules(s, count, i, j)
     if a == CYLINDER and b == SPHERE:
-        return sphere_cylinder(which, found, count, i, j, centre, axes, size, q, n, most)
+        return sphere_cylinder(s, count, i, j)
     if a == BOX and b == SPHERE:
-        return ball_box(which, found, count, i, j, 0, d[0], d[1], d[2], size[j, 0],
-                        centre, axes, size, q, n, most)  # fmt: skip
+        return ball_box(s, count, i, j, 0, d[0], d[1], d[2], s.size[j, 0])
     if a == BOX and b == CAPSULE:
-        return capsule_box(which, found, count, i, j, centre, axes, size, q, n, most)
-    return boxes(which, found, count, i, j, centre, axes, size, s.scratch, most)
+        return capsule_box(s, count, i, j)
+    return boxes(s, count, i, j)
 
 
 @compiled

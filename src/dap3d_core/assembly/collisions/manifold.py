@@ -3,9 +3,9 @@
 import math
 
 from dap3d_core.assembly.collisions.distance import dot
-from dap3d_core.assembly.collisions.records import GAP, add
-from dap3d_core.assembly.collisions.supports import CORNERS, near_support, radius_of
-from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.assembly.collisions.placed_shapes import GAP, PlacedShapes, add
+from dap3d_core.assembly.collisions.supports import CORNERS, extent_of, near_support, radius_of
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.scene.contacts.collision_shapes import PLANE
 
@@ -143,48 +143,38 @@ def crossing(work: Floats) -> bool:
 
 
 @compiled
-def at_plane_along(
-    i: int, j: int, band: float, most: float, kind: Integers, centre: Floats, axes: Floats,
-    size: Floats, corners: Integers, vertices: Floats, work: Floats, n: Floats, which: Integers,
-    found: Floats, count: int,
-) -> int:  # fmt: skip
+def at_plane_along(shapes: PlacedShapes, i: int, j: int, band: float, n: Floats, count: int) -> int:
     """Append the points of solid i within a band above plane j; the new count."""
-    ri, level = radius_of(i, kind, size), dot(centre[j], n)
-    ni = near_support(i, -1.0, n, band, kind, centre, axes, size, corners, vertices, work, POLYGON)
+    ri, level = radius_of(shapes, i), dot(shapes.centre[j], n)
+    ni = near_support(shapes, i, -1.0, n, band, POLYGON)
     for c in range(ni):
-        p = work[POLYGON + c]
+        p = shapes.work[POLYGON + c]
         high = dot(p, n) - level
-        count = add(which, found, count, i, j, c, p[0] - high * n[0], p[1] - high * n[1],
-                    p[2] - high * n[2], n[0], n[1], n[2], high - ri, most)  # fmt: skip
+        count = add(shapes, count, i, j, c, p[0] - high * n[0], p[1] - high * n[1],
+                    p[2] - high * n[2], n[0], n[1], n[2], high - ri)  # fmt: skip
     return count
 
 
 @compiled
-def put_points(
-    i: int, j: int, gap: float, most: float, kind: Integers, centre: Floats, axes: Floats,
-    size: Floats, corners: Integers, vertices: Floats, work: Floats, n: Floats, which: Integers,
-    found: Floats, count: int,
-) -> int:  # fmt: skip
+def put_points(shapes: PlacedShapes, i: int, j: int, gap: float, n: Floats, count: int) -> int:
     """Append the points of solids i and j, or of i at plane j, along n; the new count.
 
     Points that may come to touch are among them, if the nearest one is.
 
-    gap: of the solids, m; corners, vertices, work: as of ``touch_convex``.
+    gap: of the solids, m.
     """
-    extent = math.sqrt(dot(size[i], size[i]))
+    extent, work, most = extent_of(shapes, i), shapes.work, shapes.near[i] + shapes.near[j]
     band = min(most - gap, DEEPEST * extent)
-    if kind[j] == PLANE:
-        return at_plane_along(i, j, band, most, kind, centre, axes, size, corners, vertices, work,
-                              n, which, found, count)  # fmt: skip
+    if shapes.kind[j] == PLANE:
+        return at_plane_along(shapes, i, j, band, n, count)
     tangents(n, work)
     before = count
     for _ in range(2):
-        count = points_within(i, j, band, gap, most, kind, centre, axes, size, corners, vertices,
-                              work, n, which, found, before)  # fmt: skip
+        count = points_within(shapes, i, j, band, gap, n, before)
         least = 1e300
-        for c in range(before, min(count, found.shape[0])):
-            least = min(least, found[c, GAP])
-        if count > found.shape[0] or least <= gap + BORDER * band:
+        for c in range(before, min(count, shapes.found.shape[0])):
+            least = min(least, shapes.found[c, GAP])
+        if count > shapes.found.shape[0] or least <= gap + BORDER * band:
             break
         band = ON_LINE * extent
     return count
@@ -192,18 +182,13 @@ def put_points(
 
 @compiled
 def points_within(
-    i: int, j: int, band: float, gap: float, most: float, kind: Integers, centre: Floats,
-    axes: Floats, size: Floats, corners: Integers, vertices: Floats, work: Floats, n: Floats,
-    which: Integers, found: Floats, count: int,
-) -> int:  # fmt: skip
+    shapes: PlacedShapes, i: int, j: int, band: float, gap: float, n: Floats, count: int
+) -> int:
     """Append the points of solids i and j within a band of their support planes along n."""
-    ri, rj, extent = (
-        radius_of(i, kind, size),
-        radius_of(j, kind, size),
-        math.sqrt(dot(size[i], size[i])),
-    )
-    ni = near_support(i, -1.0, n, band, kind, centre, axes, size, corners, vertices, work, POLYGON)
-    nj = near_support(j, 1.0, n, band, kind, centre, axes, size, corners, vertices, work, OTHER)
+    ri, rj, extent = radius_of(shapes, i), radius_of(shapes, j), extent_of(shapes, i)
+    work = shapes.work
+    ni = near_support(shapes, i, -1.0, n, band, POLYGON)
+    nj = near_support(shapes, j, 1.0, n, band, OTHER)
     single, from_i, left, passing = ni == 1 or nj == 1, ni == 1, 1, gap
     if not single:
         ni, nj = outline(work, POLYGON, ni), outline(work, OTHER, nj)
@@ -232,6 +217,6 @@ def points_within(
         high = dot(p, n) - level
         own = passing if single else (high if from_i else -high) - ri - rj
         back = ri + own if from_i else -rj  # to the surface of j
-        count = add(which, found, count, i, j, 1 + c, p[0] - back * n[0], p[1] - back * n[1],
-                    p[2] - back * n[2], n[0], n[1], n[2], own, most)  # fmt: skip
+        count = add(shapes, count, i, j, 1 + c, p[0] - back * n[0], p[1] - back * n[1],
+                    p[2] - back * n[2], n[0], n[1], n[2], own)  # fmt: skip
     return count

@@ -1,15 +1,12 @@
 """The shapes of a model that collide, as arrays of compiled code, and where they are."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 import attrs
 import numpy as np
 
-from dap3d_core.assembly.collisions.boxes import CORNERS
-from dap3d_core.assembly.collisions.convex import ROWS
-from dap3d_core.assembly.collisions.records import WIDTH
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays, Scalar
+from dap3d_core.kernels.runtime.array_struct import Arrays, IntegerMatrix, Matrix, Scalar
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.model.rotations import rotation
 from dap3d_core.scene.contacts.collision_shapes import PLANE, CollisionShapes
@@ -18,25 +15,16 @@ from dap3d_core.scene.contacts.collision_shapes import PLANE, CollisionShapes
 ROOM = 64
 #: Columns of a pose: position, m, and Euler parameters.
 POSE = 7
+#: Columns of a point: that halfway between both surfaces, the unit normal from shape j to shape i,
+#: the gap. In ``which``: shapes i and j, and a number that tells points of a pair apart.
+POINT, NORMAL, GAP, WIDTH = 0, 3, 6, 7
+#: Rows of scratch: of two polygons of boxes, with corners, at most 8 each; of convex solids.
+CORNERS, ROWS = 16, 120
 
 
 @attrs.define(eq=False, kw_only=True, slots=False)
 class PlacedShapes(Arrays):
     """m shapes that collide at one pose, and room for the points where they may touch."""
-
-    types: ClassVar[dict[str, Any]] = {
-        **dict.fromkeys(
-            ("integer", "kind", "body", "apart", "material", "solids", "planes", "small", "large",
-             "head", "following"),
-            INTEGERS,
-        ),
-        **dict.fromkeys(("corners", "bits", "cells", "pairs", "which"), INTEGER_MATRIX),
-        **dict.fromkeys(
-            ("at", "local", "size", "vertices", "mu", "mu_roll", "mu_spin", "e", "centre", "axes",
-             "found", "scratch", "work"),
-            MATRIX,
-        ),
-    }  # fmt: skip
 
     pair_count = Scalar[int]("integer")
     point_count = Scalar[int]("integer")  # where it is beyond the room, the points are not all
@@ -44,35 +32,35 @@ class PlacedShapes(Arrays):
     integer: Integers
     kind: Integers  # those of the model, as in CollisionShapes
     body: Integers
-    at: Floats
-    local: Floats  # (m, 9) rows of the matrices of their axes in the body
-    size: Floats
-    corners: Integers
-    vertices: Floats
-    bits: Integers
+    at: Matrix
+    local: Matrix  # (m, 9) rows of the matrices of their axes in the body
+    size: Matrix
+    corners: IntegerMatrix
+    vertices: Matrix
+    bits: IntegerMatrix
     material: Integers
-    mu: Floats
-    mu_roll: Floats  # none where nothing resists rolling, or spinning
-    mu_spin: Floats
-    e: Floats
+    mu: Matrix
+    mu_roll: Matrix  # none where nothing resists rolling, or spinning
+    mu_spin: Matrix
+    e: Matrix
     apart: Integers
     reach: Floats
     solids: Integers  # indices of all but planes
     planes: Integers
-    centre: Floats  # (m, 3) m, global axes
-    axes: Floats  # (m, 9) rows of the matrices of their axes
+    centre: Matrix  # (m, 3) m, global axes
+    axes: Matrix  # (m, 9) rows of the matrices of their axes
     near: Floats  # (m,) m, nearer than the sum of those of both is near
     sorted: Floats  # (solids,) scratch of the broad phase, as the next five
     small: Integers
     large: Integers
-    cells: Integers
+    cells: IntegerMatrix
     head: Integers
     following: Integers
-    pairs: Integers  # (room, 2) shapes
-    which: Integers  # (room, 3), (room, WIDTH) as in records.py
-    found: Floats
-    scratch: Floats  # of boxes
-    work: Floats  # of convex solids
+    pairs: IntegerMatrix  # (room, 2) shapes
+    which: IntegerMatrix  # (room, 3), (room, WIDTH) points
+    found: Matrix
+    scratch: Matrix  # of boxes and balls
+    work: Matrix  # of convex solids
 
 
 def placed_shapes(shapes: CollisionShapes | None) -> PlacedShapes:
@@ -125,6 +113,26 @@ def with_room(s: PlacedShapes) -> PlacedShapes:
         which=np.zeros((points, 3), dtype=np.int64),
         found=np.zeros((points, WIDTH)),
     )
+
+
+@compiled
+def add(
+    shapes: PlacedShapes, count: int, i: int, j: int, feature: int,
+    x: float, y: float, z: float, nx: float, ny: float, nz: float, gap: float,
+) -> int:  # fmt: skip
+    """Append a point whose gap is near; the new count, beyond the room if there is none.
+
+    x, y, z: the point on the surface of shape j.
+    """
+    if not gap < shapes.near[i] + shapes.near[j]:
+        return count
+    if count < shapes.found.shape[0]:
+        which, row, half = shapes.which[count], shapes.found[count], 0.5 * gap
+        which[0], which[1], which[2] = i, j, feature
+        row[0], row[1], row[2] = x + half * nx, y + half * ny, z + half * nz
+        row[3], row[4], row[5] = nx, ny, nz
+        row[6] = gap
+    return count + 1
 
 
 @compiled

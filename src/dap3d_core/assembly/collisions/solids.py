@@ -6,8 +6,8 @@ plane gaps of centres, ends, corners and rims.
 
 import math
 
-from dap3d_core.assembly.collisions.records import add
-from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.assembly.collisions.placed_shapes import CORNERS, PlacedShapes, add
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.scene.contacts.collision_shapes import BOX, CAPSULE, CYLINDER, SPHERE
 
@@ -17,52 +17,46 @@ FLAT = 1e-9
 
 @compiled
 def above(
-    which: Integers, found: Floats, count: int, i: int, j: int, feature: int,
-    x: float, y: float, z: float, radius: float, centre: Floats, axes: Floats, most: float,
+    shapes: PlacedShapes, count: int, i: int, j: int, feature: int, x: float, y: float, z: float,
+    radius: float,
 ) -> int:  # fmt: skip
     """A ball of shape i above plane j."""
-    o, a = centre[j], axes[j]
+    o, a = shapes.centre[j], shapes.axes[j]
     nx, ny, nz = a[2], a[5], a[8]
     height = (x - o[0]) * nx + (y - o[1]) * ny + (z - o[2]) * nz
-    return add(which, found, count, i, j, feature, x - height * nx, y - height * ny,
-               z - height * nz, nx, ny, nz, height - radius, most)  # fmt: skip
+    return add(shapes, count, i, j, feature, x - height * nx, y - height * ny,
+               z - height * nz, nx, ny, nz, height - radius)  # fmt: skip
 
 
 @compiled
-def at_plane(
-    which: Integers, found: Floats, count: int, i: int, j: int, kind: int,
-    centre: Floats, axes: Floats, size: Floats, most: float,
-) -> int:  # fmt: skip
-    """Shape i of a kind above plane j."""
-    d, u, radius = centre[i], axes[i], size[i, 0]
+def at_plane(shapes: PlacedShapes, count: int, i: int, j: int) -> int:
+    """Shape i above plane j."""
+    d, u, radius, kind = shapes.centre[i], shapes.axes[i], shapes.size[i, 0], shapes.kind[i]
     if kind == SPHERE:
-        return above(which, found, count, i, j, 0, d[0], d[1], d[2], radius, centre, axes, most)
+        return above(shapes, count, i, j, 0, d[0], d[1], d[2], radius)
     if kind == CAPSULE:
         for side in range(2):
-            s = size[i, 1] * (2.0 * side - 1.0)
+            s = shapes.size[i, 1] * (2.0 * side - 1.0)
             x, y, z = d[0] + s * u[2], d[1] + s * u[5], d[2] + s * u[8]
-            count = above(which, found, count, i, j, side, x, y, z, radius, centre, axes, most)
+            count = above(shapes, count, i, j, side, x, y, z, radius)
     if kind == BOX:
         for corner in range(8):
-            a = size[i, 0] * (2.0 * (corner & 1) - 1.0)
-            b = size[i, 1] * (1.0 * (corner & 2) - 1.0)
-            c = size[i, 2] * (0.5 * (corner & 4) - 1.0)
+            a = shapes.size[i, 0] * (2.0 * (corner & 1) - 1.0)
+            b = shapes.size[i, 1] * (1.0 * (corner & 2) - 1.0)
+            c = shapes.size[i, 2] * (0.5 * (corner & 4) - 1.0)
             x = d[0] + a * u[0] + b * u[1] + c * u[2]
             y = d[1] + a * u[3] + b * u[4] + c * u[5]
             z = d[2] + a * u[6] + b * u[7] + c * u[8]
-            count = above(which, found, count, i, j, corner, x, y, z, 0.0, centre, axes, most)
+            count = above(shapes, count, i, j, corner, x, y, z, 0.0)
     if kind == CYLINDER:
-        count = _rims(which, found, count, i, j, centre, axes, size, most)
+        count = _rims(shapes, count, i, j)
     return count
 
 
 @compiled
-def _rims(
-    which: Integers, found: Floats, count: int, i: int, j: int,
-    centre: Floats, axes: Floats, size: Floats, most: float,
-) -> int:  # fmt: skip
+def _rims(shapes: PlacedShapes, count: int, i: int, j: int) -> int:
     """Both rims of a cylinder: the lowest point of each, and three more a quarter turn apart."""
-    d, u, w = centre[i], axes[i], axes[j]
+    d, u, w = shapes.centre[i], shapes.axes[i], shapes.axes[j]
     # the way down within the plane of a rim, in the axes of the cylinder
     a = -(w[2] * u[0] + w[5] * u[3] + w[8] * u[6])
     b = -(w[2] * u[1] + w[5] * u[4] + w[8] * u[7])
@@ -72,14 +66,14 @@ def _rims(
     else:
         a, b = 1.0, 0.0
     for side in range(2):
-        c = size[i, 1] * (2.0 * side - 1.0)
-        p, q = size[i, 0] * a, size[i, 0] * b
+        c = shapes.size[i, 1] * (2.0 * side - 1.0)
+        p, q = shapes.size[i, 0] * a, shapes.size[i, 0] * b
         for k in range(4):
             x = d[0] + p * u[0] + q * u[1] + c * u[2]
             y = d[1] + p * u[3] + q * u[4] + c * u[5]
             z = d[2] + p * u[6] + q * u[7] + c * u[8]
             feature = 4 * side + k
-            count = above(which, found, count, i, j, feature, x, y, z, 0.0, centre, axes, most)
+            count = above(shapes, count, i, j, feature, x, y, z, 0.0)
             p, q = -q, p
     return count
 
@@ -90,8 +84,8 @@ PARALLEL = 1e-12
 
 @compiled
 def balls(
-    which: Integers, found: Floats, count: int, i: int, j: int, feature: int,
-    x: float, y: float, z: float, ri: float, a: float, b: float, c: float, rj: float, most: float,
+    shapes: PlacedShapes, count: int, i: int, j: int, feature: int, x: float, y: float, z: float,
+    ri: float, a: float, b: float, c: float, rj: float,
 ) -> int:  # fmt: skip
     """A ball of radius ri about (x, y, z), of shape i, and one of radius rj about (a, b, c)."""
     nx, ny, nz = x - a, y - b, z - c
@@ -101,8 +95,8 @@ def balls(
     else:
         nx, ny, nz = 0.0, 0.0, 1.0
     gap = length - ri - rj
-    return add(which, found, count, i, j, feature,
-               a + rj * nx, b + rj * ny, c + rj * nz, nx, ny, nz, gap, most)  # fmt: skip
+    return add(shapes, count, i, j, feature,
+               a + rj * nx, b + rj * ny, c + rj * nz, nx, ny, nz, gap)  # fmt: skip
 
 
 @compiled
@@ -113,26 +107,20 @@ def along(x: float, y: float, z: float, d: Floats, u: Floats, half: float) -> fl
 
 
 @compiled
-def sphere_capsule(
-    which: Integers, found: Floats, count: int, i: int, j: int,
-    centre: Floats, axes: Floats, size: Floats, most: float,
-) -> int:  # fmt: skip
+def sphere_capsule(shapes: PlacedShapes, count: int, i: int, j: int) -> int:
     """Capsule i and sphere j."""
-    d, u, c = centre[i], axes[i], centre[j]
-    s = along(c[0], c[1], c[2], d, u, size[i, 1])
+    d, u, c = shapes.centre[i], shapes.axes[i], shapes.centre[j]
+    s = along(c[0], c[1], c[2], d, u, shapes.size[i, 1])
     x, y, z = d[0] + s * u[2], d[1] + s * u[5], d[2] + s * u[8]
-    return balls(which, found, count, i, j, 0,
-                 x, y, z, size[i, 0], c[0], c[1], c[2], size[j, 0], most)  # fmt: skip
+    return balls(shapes, count, i, j, 0,
+                 x, y, z, shapes.size[i, 0], c[0], c[1], c[2], shapes.size[j, 0])  # fmt: skip
 
 
 @compiled
-def capsules(
-    which: Integers, found: Floats, count: int, i: int, j: int,
-    centre: Floats, axes: Floats, size: Floats, most: float,
-) -> int:  # fmt: skip
+def capsules(shapes: PlacedShapes, count: int, i: int, j: int) -> int:
     """Two capsules: their nearest points; of parallel ones the ends of what lies side by side."""
-    d, u, e, w = centre[i], axes[i], centre[j], axes[j]
-    hi, hj = size[i, 1], size[j, 1]
+    d, u, e, w = shapes.centre[i], shapes.axes[i], shapes.centre[j], shapes.axes[j]
+    hi, hj = shapes.size[i, 1], shapes.size[j, 1]
     c = u[2] * w[2] + u[5] * w[5] + u[8] * w[8]
     rx, ry, rz = e[0] - d[0], e[1] - d[1], e[2] - d[2]
     p, q = rx * u[2] + ry * u[5] + rz * u[8], rx * w[2] + ry * w[5] + rz * w[8]
@@ -141,27 +129,26 @@ def capsules(
         s = min(max((p - c * q) / det, -hi), hi)
         t = min(max(c * s - q, -hj), hj)
         s = min(max(p + c * t, -hi), hi)
-        return _pair(which, found, count, i, j, 0, s, t, centre, axes, size, most)
+        return _pair(shapes, count, i, j, 0, s, t)
     low, high = max(-hi, p - hj), min(hi, p + hj)
     if low >= high:  # end to end
         s = hi if p > 0.0 else -hi
         t = min(max(c * s - q, -hj), hj)
-        return _pair(which, found, count, i, j, 0, s, t, centre, axes, size, most)
-    count = _pair(which, found, count, i, j, 1, low, c * low - q, centre, axes, size, most)
-    return _pair(which, found, count, i, j, 2, high, c * high - q, centre, axes, size, most)
+        return _pair(shapes, count, i, j, 0, s, t)
+    count = _pair(shapes, count, i, j, 1, low, c * low - q)
+    return _pair(shapes, count, i, j, 2, high, c * high - q)
 
 
 @compiled
 def _pair(
-    which: Integers, found: Floats, count: int, i: int, j: int, feature: int, s: float, t: float,
-    centre: Floats, axes: Floats, size: Floats, most: float,
-) -> int:  # fmt: skip
+    shapes: PlacedShapes, count: int, i: int, j: int, feature: int, s: float, t: float
+) -> int:
     """The balls at s and t of two capsules."""
-    d, u, e, w = centre[i], axes[i], centre[j], axes[j]
+    d, u, e, w = shapes.centre[i], shapes.axes[i], shapes.centre[j], shapes.axes[j]
     return balls(
-        which, found, count, i, j, feature,
-        d[0] + s * u[2], d[1] + s * u[5], d[2] + s * u[8], size[i, 0],
-        e[0] + t * w[2], e[1] + t * w[5], e[2] + t * w[8], size[j, 0], most,
+        shapes, count, i, j, feature,
+        d[0] + s * u[2], d[1] + s * u[5], d[2] + s * u[8], shapes.size[i, 0],
+        e[0] + t * w[2], e[1] + t * w[5], e[2] + t * w[8], shapes.size[j, 0],
     )  # fmt: skip
 
 
@@ -183,13 +170,14 @@ def local(x: float, y: float, z: float, d: Floats, u: Floats, k: int) -> float:
 
 @compiled
 def put(
-    which: Integers, found: Floats, count: int, i: int, j: int, feature: int, q: Floats, n: Floats,
-    gap: float, radius: float, d: Floats, u: Floats, most: float,
-) -> int:  # fmt: skip
+    shapes: PlacedShapes, count: int, i: int, j: int, feature: int, gap: float, radius: float
+) -> int:
     """Append a point: ball j of a radius at solid i.
 
-    q, n: nearest point of the solid and outward normal there, in its axes; gap: of the centre.
+    In scratch: nearest point of the solid, outward normal there, in its axes. gap: of the centre.
     """
+    d, u = shapes.centre[i], shapes.axes[i]
+    q, n = shapes.scratch[CORNERS], shapes.scratch[CORNERS + 1]
     nx = u[0] * n[0] + u[1] * n[1] + u[2] * n[2]
     ny = u[3] * n[0] + u[4] * n[1] + u[5] * n[2]
     nz = u[6] * n[0] + u[7] * n[1] + u[8] * n[2]
@@ -197,17 +185,17 @@ def put(
     x = d[0] + u[0] * q[0] + u[1] * q[1] + u[2] * q[2] + s * nx
     y = d[1] + u[3] * q[0] + u[4] * q[1] + u[5] * q[2] + s * ny
     z = d[2] + u[6] * q[0] + u[7] * q[1] + u[8] * q[2] + s * nz
-    return add(which, found, count, i, j, feature, x, y, z, -nx, -ny, -nz, s, most)
+    return add(shapes, count, i, j, feature, x, y, z, -nx, -ny, -nz, s)
 
 
 @compiled
 def ball_box(
-    which: Integers, found: Floats, count: int, i: int, j: int, feature: int,
-    x: float, y: float, z: float, radius: float,
-    centre: Floats, axes: Floats, size: Floats, q: Floats, n: Floats, most: float,
+    shapes: PlacedShapes, count: int, i: int, j: int, feature: int, x: float, y: float, z: float,
+    radius: float,
 ) -> int:  # fmt: skip
-    """Box i and a ball of shape j; q, n: (3,) scratch."""
-    d, u, h = centre[i], axes[i], size[i]
+    """Box i and a ball of shape j."""
+    q, n = shapes.scratch[CORNERS], shapes.scratch[CORNERS + 1]
+    d, u, h = shapes.centre[i], shapes.axes[i], shapes.size[i]
     length, nearest, face = 0.0, -1e300, 0
     for k in range(3):
         p = local(x, y, z, d, u, k)
@@ -226,16 +214,15 @@ def ball_box(
         n[face] = side
         q[face] = side * h[face]
         length = nearest
-    return put(which, found, count, i, j, feature, q, n, length, radius, d, u, most)
+    return put(shapes, count, i, j, feature, length, radius)
 
 
 @compiled
-def sphere_cylinder(
-    which: Integers, found: Floats, count: int, i: int, j: int,
-    centre: Floats, axes: Floats, size: Floats, q: Floats, n: Floats, most: float,
-) -> int:  # fmt: skip
-    """Cylinder i and sphere j; q, n: (3,) scratch."""
-    c, d, u, r, h = centre[j], centre[i], axes[i], size[i, 0], size[i, 1]
+def sphere_cylinder(shapes: PlacedShapes, count: int, i: int, j: int) -> int:
+    """Cylinder i and sphere j."""
+    q, n = shapes.scratch[CORNERS], shapes.scratch[CORNERS + 1]
+    c, d, u = shapes.centre[j], shapes.centre[i], shapes.axes[i]
+    r, h = shapes.size[i, 0], shapes.size[i, 1]
     x, y = local(c[0], c[1], c[2], d, u, 0), local(c[0], c[1], c[2], d, u, 1)
     z, across = local(c[0], c[1], c[2], d, u, 2), math.sqrt(x * x + y * y)
     a = x / across if across > 0.0 else 1.0
@@ -254,57 +241,52 @@ def sphere_cylinder(
         s = side * h
         n[0], n[1], n[2] = 0.0, 0.0, side
     q[0], q[1], q[2] = a * p, b * p, s
-    return put(which, found, count, i, j, 0, q, n, length, size[j, 0], d, u, most)
+    return put(shapes, count, i, j, 0, length, shapes.size[j, 0])
 
 
 @compiled
-def capsule_box(
-    which: Integers, found: Floats, count: int, i: int, j: int,
-    centre: Floats, axes: Floats, size: Floats, q: Floats, n: Floats, most: float,
-) -> int:  # fmt: skip
+def capsule_box(shapes: PlacedShapes, count: int, i: int, j: int) -> int:
     """Box i and capsule j: the balls at its ends, and that at its point nearest to the box."""
-    c, w, radius, half = centre[j], axes[j], size[j, 0], size[j, 1]
+    c, w, radius, half = shapes.centre[j], shapes.axes[j], shapes.size[j, 0], shapes.size[j, 1]
     low, high = -half, half
     # the squared distance is convex along the axis: its slope is monotonic
-    if slope(low, i, j, centre, axes, size) < 0.0 < slope(high, i, j, centre, axes, size):
-        s = _lowest(low, high, i, j, centre, axes, size)
+    if slope(shapes, low, i, j) < 0.0 < slope(shapes, high, i, j):
+        s = _lowest(shapes, low, high, i, j)
         x, y, z = c[0] + s * w[2], c[1] + s * w[5], c[2] + s * w[8]
-        count = ball_box(which, found, count, i, j, BETWEEN,
-                         x, y, z, radius, centre, axes, size, q, n, most)  # fmt: skip
+        count = ball_box(shapes, count, i, j, BETWEEN, x, y, z, radius)
     for end in range(2):
         s = half * (2.0 * end - 1.0)
         x, y, z = c[0] + s * w[2], c[1] + s * w[5], c[2] + s * w[8]
-        count = ball_box(which, found, count, i, j, end,
-                         x, y, z, radius, centre, axes, size, q, n, most)  # fmt: skip
+        count = ball_box(shapes, count, i, j, end, x, y, z, radius)
     return count
 
 
 @compiled
-def slope(s: float, i: int, j: int, centre: Floats, axes: Floats, size: Floats) -> float:
+def slope(shapes: PlacedShapes, s: float, i: int, j: int) -> float:
     """Half the slope of the squared distance of box i at s along the axis of capsule j."""
-    c, w, d, u, total = centre[j], axes[j], centre[i], axes[i], 0.0
+    c, w, d, u, total = shapes.centre[j], shapes.axes[j], shapes.centre[i], shapes.axes[i], 0.0
     x, y, z = c[0] + s * w[2], c[1] + s * w[5], c[2] + s * w[8]
     for k in range(3):
         p = local(x, y, z, d, u, k)
-        total += (p - clamp(p, size[i, k])) * (u[k] * w[2] + u[3 + k] * w[5] + u[6 + k] * w[8])
+        total += (p - clamp(p, shapes.size[i, k])) * (
+            u[k] * w[2] + u[3 + k] * w[5] + u[6 + k] * w[8]
+        )
     return total
 
 
 @compiled
-def _lowest(
-    low: float, high: float, i: int, j: int, centre: Floats, axes: Floats, size: Floats
-) -> float:
+def _lowest(shapes: PlacedShapes, low: float, high: float, i: int, j: int) -> float:
     """The zero of a slope that is linear between places where a face is passed."""
-    c, w, d, u = centre[j], axes[j], centre[i], axes[i]
+    c, w, d, u = shapes.centre[j], shapes.axes[j], shapes.centre[i], shapes.axes[i]
     for k in range(6):
         face, side = k // 2, 2.0 * (k % 2) - 1.0
         rate = u[face] * w[2] + u[3 + face] * w[5] + u[6 + face] * w[8]
         if abs(rate) > 1e-12:
-            s = (side * size[i, face] - local(c[0], c[1], c[2], d, u, face)) / rate
+            s = (side * shapes.size[i, face] - local(c[0], c[1], c[2], d, u, face)) / rate
             if low < s < high:
-                if slope(s, i, j, centre, axes, size) < 0.0:
+                if slope(shapes, s, i, j) < 0.0:
                     low = s
                 else:
                     high = s
-    first, last = slope(low, i, j, centre, axes, size), slope(high, i, j, centre, axes, size)
+    first, last = slope(shapes, low, i, j), slope(shapes, high, i, j)
     return low - first * (high - low) / (last - first) if last > first else 0.5 * (low + high)

@@ -6,7 +6,8 @@ A capsule is its axis here, a sphere its centre; their radii are added to distan
 import math
 
 from dap3d_core.assembly.collisions.boxes import dot_axis
-from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.assembly.collisions.placed_shapes import PlacedShapes
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.scene.contacts.collision_shapes import (
     BOX,
@@ -24,28 +25,30 @@ RIM, CORNERS = 8, 16
 
 
 @compiled
-def radius_of(k: int, kind: Integers, size: Floats) -> float:
+def radius_of(shapes: PlacedShapes, k: int) -> float:
     """What is added to the core of a solid, m."""
-    return size[k, 0] if kind[k] == SPHERE or kind[k] == CAPSULE else 0.0
+    return shapes.size[k, 0] if shapes.kind[k] == SPHERE or shapes.kind[k] == CAPSULE else 0.0
 
 
 @compiled
-def put_global(
-    x: float, y: float, z: float, k: int, centre: Floats, axes: Floats, out: Floats
-) -> None:
+def extent_of(shapes: PlacedShapes, k: int) -> float:
+    """Length of the sizes of a solid, m."""
+    size = shapes.size[k]
+    return math.sqrt(size[0] * size[0] + size[1] * size[1] + size[2] * size[2])
+
+
+@compiled
+def put_global(shapes: PlacedShapes, k: int, x: float, y: float, z: float, out: Floats) -> None:
     """A point of solid k, given in its axes."""
-    c, u = centre[k], axes[k]
+    c, u = shapes.centre[k], shapes.axes[k]
     for r in range(3):
         out[r] = c[r] + u[3 * r] * x + u[3 * r + 1] * y + u[3 * r + 2] * z
 
 
 @compiled
-def support(
-    k: int, sign: float, d: Floats, kind: Integers, centre: Floats, axes: Floats, size: Floats,
-    corners: Integers, vertices: Floats, out: Floats,
-) -> None:  # fmt: skip
+def support(shapes: PlacedShapes, k: int, sign: float, d: Floats, out: Floats) -> None:
     """The point of solid k that lies farthest along sign d."""
-    u, h, what = axes[k], size[k], kind[k]
+    u, h, what, vertices = shapes.axes[k], shapes.size[k], shapes.kind[k], shapes.vertices
     x = sign * dot_axis(u, 0, d[0], d[1], d[2])
     y = sign * dot_axis(u, 1, d[0], d[1], d[2])
     z = sign * dot_axis(u, 2, d[0], d[1], d[2])
@@ -65,29 +68,28 @@ def support(
         p, q, s = p / length, q / length, s / length
     elif what == HULL:
         best, at = -1e300, 0
-        for c in range(corners[k, 0], corners[k, 0] + corners[k, 1]):
+        first = shapes.corners[k, 0]
+        for c in range(first, first + shapes.corners[k, 1]):
             far = vertices[c, 0] * x + vertices[c, 1] * y + vertices[c, 2] * z
             if far > best:
                 best, at = far, c
         p, q, s = vertices[at, 0], vertices[at, 1], vertices[at, 2]
-    put_global(p, q, s, k, centre, axes, out)
+    put_global(shapes, k, p, q, s, out)
 
 
 @compiled
-def curvature(
-    k: int, d: Floats, s: Floats, t: Floats, kind: Integers, axes: Floats, size: Floats
-) -> float:
+def curvature(shapes: PlacedShapes, k: int, d: Floats, s: Floats, t: Floats) -> float:
     """Product s H t, H the derivative of the support of solid k at unit d, even in d; m."""
-    u, h = axes[k], size[k]
+    u, h = shapes.axes[k], shapes.size[k]
     x, y = dot_axis(u, 0, d[0], d[1], d[2]), dot_axis(u, 1, d[0], d[1], d[2])
     a, b = dot_axis(u, 0, s[0], s[1], s[2]), dot_axis(u, 1, s[0], s[1], s[2])
     p, q = dot_axis(u, 0, t[0], t[1], t[2]), dot_axis(u, 1, t[0], t[1], t[2])
-    if kind[k] == CYLINDER:
+    if shapes.kind[k] == CYLINDER:
         across = x * x + y * y
         if across < FLAT * FLAT:
             return 0.0
         return h[0] * (x * b - y * a) * (x * q - y * p) / (across * math.sqrt(across))
-    if kind[k] == ELLIPSOID:
+    if shapes.kind[k] == ELLIPSOID:
         z = dot_axis(u, 2, d[0], d[1], d[2])
         c, r = dot_axis(u, 2, s[0], s[1], s[2]), dot_axis(u, 2, t[0], t[1], t[2])
         e, f, g = h[0] * h[0], h[1] * h[1], h[2] * h[2]
@@ -99,16 +101,15 @@ def curvature(
 
 @compiled
 def near_support(
-    k: int, sign: float, d: Floats, band: float, kind: Integers, centre: Floats, axes: Floats,
-    size: Floats, corners: Integers, vertices: Floats, out: Floats, start: int,
-) -> int:  # fmt: skip
+    shapes: PlacedShapes, k: int, sign: float, d: Floats, band: float, start: int
+) -> int:
     """Put the points of solid k within a band below its support plane along sign d; their number.
 
-    out: rows from ``start`` on, CORNERS at most.
+    They are rows of scratch from ``start`` on, CORNERS at most.
     """
-    u, h, what, count = axes[k], size[k], kind[k], 0
+    u, h, what, count = shapes.axes[k], shapes.size[k], shapes.kind[k], 0
     if what in (SPHERE, ELLIPSOID):
-        support(k, sign, d, kind, centre, axes, size, corners, vertices, out[start])
+        support(shapes, k, sign, d, shapes.work[start])
         return 1
     x = sign * dot_axis(u, 0, d[0], d[1], d[2])
     y = sign * dot_axis(u, 1, d[0], d[1], d[2])
@@ -117,13 +118,13 @@ def near_support(
     a, b = (x / across, y / across) if across > FLAT else (1.0, 0.0)
     total = 2 if what == CAPSULE else 2 * RIM if what == CYLINDER else 8
     if what == HULL:
-        total = corners[k, 1]
+        total = shapes.corners[k, 1]
     best, e, f = -1e300, 1.0, 0.0
     for turn in range(2):  # the farthest first, then what is nearly as far
         for c in range(total):
             p, q, s = 0.0, 0.0, 0.0
             if what == HULL:
-                v = vertices[corners[k, 0] + c]
+                v = shapes.vertices[shapes.corners[k, 0] + c]
                 p, q, s = v[0], v[1], v[2]
             elif what == BOX:
                 p = h[0] * (2.0 * (c & 1) - 1.0)
@@ -140,6 +141,6 @@ def near_support(
             if turn == 0:
                 best = max(best, far)
             elif far >= best - band and count < CORNERS:
-                put_global(p, q, s, k, centre, axes, out[start + count])
+                put_global(shapes, k, p, q, s, shapes.work[start + count])
                 count += 1
     return count

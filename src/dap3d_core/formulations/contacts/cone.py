@@ -18,13 +18,11 @@ Dense, for as many contacts as touch in one place.
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
-from typing import Any, ClassVar
-
 import attrs
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.kernels.runtime.array_struct import INTEGERS, MATRIX, Arrays, Scalar
+from dap3d_core.kernels.runtime.array_struct import Arrays, Matrix, Scalar
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.least_squares import factor_least, solve_least
 
@@ -50,15 +48,10 @@ def _integer() -> Scalar[int]:
 class Cone(Arrays):
     """A problem of ``count`` contacts, of m at most, and scratch."""
 
-    types: ClassVar[dict[str, Any]] = {
-        **dict.fromkeys(("integer", "order", "under"), INTEGERS),
-        **dict.fromkeys(("A", "K", "firm", "S", "w"), MATRIX),
-    }
-
     count = _integer()
 
     integer: Integers
-    A: Floats  # (3 m, 3 m), (3 m,) of u = A x + b
+    A: Matrix  # (3 m, 3 m), (3 m,) of u = A x + b
     b: Floats
     x: Floats  # where to begin, and the solution
     noise: Floats  # (3 m,) what of b is rounding: less of a residual is none
@@ -67,11 +60,11 @@ class Cone(Arrays):
     gapless: Floats  # (m,) 1 of friction in three directions, else 0
     ratio: Floats  # (m,) of coefficients along t2 to mu, that along t1
     under: Integers  # (m,) contact whose normal widens the disc: itself, or where it resists
-    K: Floats  # A and b stretched; and firmer, with its derivatives
+    K: Matrix  # A and b stretched; and firmer, with its derivatives
     q: Floats
-    firm: Floats
+    firm: Matrix
     moved: Floats
-    S: Floats
+    S: Matrix
     r: Floats  # (m,) 1 over the largest mobility of each
     F: Floats  # (3 m,) residual, step, trial, solutions
     step: Floats
@@ -79,7 +72,7 @@ class Cone(Arrays):
     y: Floats
     z: Floats
     new: Floats
-    w: Floats  # of factors
+    w: Matrix  # of factors
     order: Integers
 
 

@@ -1,6 +1,6 @@
 """Arrays on which compiled code decides what contacts do at an instant."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 import attrs
 import numpy as np
@@ -8,12 +8,11 @@ import numpy as np
 from dap3d_core.formulations.contacts.cone import Cone, cone_of
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import (
-    INTEGER_MATRIX,
-    INTEGERS,
-    MATRIX,
-    TENSOR,
     Arrays,
+    IntegerMatrix,
+    Matrix,
     Scalar,
+    Tensor,
 )
 
 
@@ -32,13 +31,9 @@ class ContactOutputs(Arrays):
     Its numbers are those of the kernel ``tension`` (interface/contacts/rows.py).
     """
 
-    types: ClassVar[dict[str, Any]] = {
-        "groups": INTEGER_MATRIX, "which": INTEGERS, "found": MATRIX,
-    }  # fmt: skip
-
-    groups: Integers  # (loops, 5) i0, p0, count; numbers of a contact; first of ``which``
+    groups: IntegerMatrix  # (loops, 5) i0, p0, count; numbers of a contact; first of ``which``
     which: Integers  # (m,) contacts, in the order of the loops
-    found: Floats  # (m, WIDTH)
+    found: Matrix  # (m, WIDTH)
     values: Floats  # scratch of a loop
     place: Floats  # (1,)
 
@@ -50,27 +45,6 @@ class ContactArrays(Arrays):
     Sets of contacts are their numbers, ascending, and how many they are; or 1 for each that is in
     it. Directions are in the frames of contacts: normal, tangents.
     """
-
-    types: ClassVar[dict[str, Any]] = {
-        "cone": Cone.type_of(),
-        "says": ContactOutputs.type_of(),
-        **dict.fromkeys(
-            ("integer", "newton", "alone", "under", "load_row", "load_count", "load_pushes",
-             "touching", "closed", "group", "kept", "mine", "begins", "leaves", "gone", "slides",
-             "slipping", "jams", "order", "rows", "before", "along_with", "state", "frame_body",
-             "model_row", "in_touch", "stops", "opening", "is_low", "rests_soon", "role",
-             "is_active", "active"),
-            INTEGERS,
-        ),
-        **dict.fromkeys(("holds", "feels", "switches", "ended", "taking"), INTEGER_MATRIX),
-        **dict.fromkeys(
-            ("W", "reaction", "slip", "begin_way", "along", "way", "near", "force", "B", "w",
-             "taken", "rests", "J", "scaled", "moves", "K", "answers", "driven", "kept_way",
-             "impulses", "restitution"),
-            MATRIX,
-        ),
-        "frames": TENSOR,
-    }  # fmt: skip
 
     touching_count = _integer()
     closed_count = _integer()
@@ -103,10 +77,10 @@ class ContactArrays(Arrays):
     newton: Integers  # 1 where the law of impact is Newton's
     alone: Integers  # 1 of friction without a gap: of joints
     under: Integers  # of what resists rolling the contact whose normal force bounds it; else -1
-    holds: Integers  # (m, 3) 1 of rows that act where it sticks
+    holds: IntegerMatrix  # (m, 3) 1 of rows that act where it sticks
     turns: Floats  # 1 of those whose gap or slip is an angle
     state: Integers  # the first of their numbers among the states of elements
-    switches: Integers  # (m, 2) among those of the model
+    switches: IntegerMatrix  # (m, 2) among those of the model
     frame_body: Integers  # a body, and 1 or -1: its block of their rows is the frame
     frame_sign: Floats
     model_row: Integers  # rows of the model, in the order of the plan
@@ -120,35 +94,35 @@ class ContactArrays(Arrays):
     v: Floats  # (6 n,) r_dot and omega at present, and before
     v_before: Floats
     push: Floats  # changes of them, or small r and rotation vectors
-    J: Floats  # (rows of all, 6 n) along global axes, and scaled
-    scaled: Floats
+    J: Matrix  # (rows of all, 6 n) along global axes, and scaled
+    scaled: Matrix
     unit: Floats  # (rows,) of joints: 1 over their lengths, and scratch
     unit_of: Floats
-    K: Floats  # (rows, 6 n) their factors; columns of the pseudo-inverse
-    answers: Floats
-    moves: Floats  # (3 m, 6 n) changes of scaled velocities by unit impulses
-    driven: Floats  # (m, 3) velocity of the motion that drivers prescribe
-    W: Floats  # (3 m, 3 m) changes of slip by impulses
+    K: Matrix  # (rows, 6 n) their factors; columns of the pseudo-inverse
+    answers: Matrix
+    moves: Matrix  # (3 m, 6 n) changes of scaled velocities by unit impulses
+    driven: Matrix  # (m, 3) velocity of the motion that drivers prescribe
+    W: Matrix  # (3 m, 3 m) changes of slip by impulses
     free: Floats  # (3 m,) rates of slip where all contacts are open
-    slip: Floats  # (m, 3)
+    slip: Matrix  # (m, 3)
     closing: Floats  # (m,) rates of gaps
     load: Floats  # (m,) of friction alone, by which mu is multiplied
-    frames: Floats  # (m, 3, 3)
-    feels: Integers  # (m, m) 1 where one changes slip or load of the other
+    frames: Tensor  # (m, 3, 3)
+    feels: IntegerMatrix  # (m, m) 1 where one changes slip or load of the other
     lam_free: Floats  # (rows,) multipliers of joints where all contacts are open
-    reaction: Floats  # (rows, 3 m) their changes by forces
+    reaction: Matrix  # (rows, 3 m) their changes by forces
     # what is asked for
-    ended: Integers  # (m, 2) 1 of switches that have changed their sign
+    ended: IntegerMatrix  # (m, 2) 1 of switches that have changed their sign
     limit: Floats  # (m,) gaps below which bodies touch
     touching: Integers  # contacts of no gap
     begins: Integers  # 1 of those at rest that begin to slide, and the direction of that
-    begin_way: Floats
+    begin_way: Matrix
     leaves: Integers  # 1 of those whose normal force has just vanished
     # what is found
     mode: Floats  # (m,) 0 open, 1 slides, 2 sticks
-    way: Floats  # (m, 3) directions of sliding, as long as ``length``, zero where none is known; of
-    near: Floats  # friction alone that sticks 1 for rows that do not hold, as others hold that;
-    force: Floats  # forces on body i of those that share, global axes; forces in their frames
+    way: Matrix  # (m, 3) directions of sliding, as long as ``length``, zero where none is known; of
+    near: Matrix  # friction alone that sticks 1 for rows that do not hold, as others hold that;
+    force: Matrix  # forces on body i of those that share, global axes; forces in their frames
     jams: Integers  # 1 of contacts that jam
     moved: Floats  # (6 n,) small r and rotation vectors
     # of an event
@@ -156,20 +130,20 @@ class ContactArrays(Arrays):
     in_touch: Integers  # contacts that touch
     stops: Integers  # 1 of those whose slip is stopped
     opening: Integers  # 1 of those that open again at once
-    impulses: Floats  # (m, 3); work, J, of each and of drivers that it makes work
+    impulses: Matrix  # (m, 3); work, J, of each and of drivers that it makes work
     work: Floats
     rests_soon: Integers  # 1 of those whose bounces end, and how long these take, s
     rest_time: Floats
     is_low: Integers  # 1 of those that are held, as they would be back at once
     e_now: Floats
-    taking: Integers  # (rounds, m) 1 of those that take part, with restitution; -1: slip is stopped
-    restitution: Floats
+    taking: IntegerMatrix  # (rounds, m) 1 of those that take part, with restitution; -1: slip ends
+    restitution: Matrix
     role: Integers  # of ``lift``: 1 of what it holds, 2 of what it lets not be less than ``least``
     values: Floats
     least: Floats
     is_active: Integers
     active: Integers
-    kept_way: Floats
+    kept_way: Matrix
     # of the set that is worked on
     closed: Integers
     group: Integers
@@ -178,7 +152,7 @@ class ContactArrays(Arrays):
     gone: Integers  # 1 of what has left, and of what leaves with it
     along_with: Integers
     slides: Integers  # 1 of contacts that slide, the direction, and what begins to slip
-    along: Floats
+    along: Matrix
     slipping: Integers
     inner: Floats  # (3 m,) forces well within cones; accelerations
     rates: Floats
@@ -187,12 +161,12 @@ class ContactArrays(Arrays):
     mine: Integers  # contacts with such
     loads: Floats  # (l,) taken, given
     given: Floats
-    taken: Floats  # (l + 1, l) the last ones, and what they missed
-    rests: Floats
+    taken: Matrix  # (l + 1, l) the last ones, and what they missed
+    rests: Matrix
     # scratch
     rows: Integers  # (3 m,)
-    B: Floats  # factors
-    w: Floats
+    B: Matrix  # factors
+    w: Matrix
     order: Integers
     x: Floats
     right: Floats  # right-hand sides

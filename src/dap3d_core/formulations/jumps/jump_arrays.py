@@ -1,6 +1,6 @@
 """The elements of a model by which velocities jump, or whose states do, as arrays of the law."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 import attrs
 import numpy as np
@@ -8,8 +8,13 @@ import numpy as np
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.loop_source import JUMP_KINDS, row_count, stride
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.kernels.compiler.types import FLOAT, Array
-from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays, Scalar
+from dap3d_core.kernels.runtime.array_struct import (
+    Arrays,
+    IntegerMatrix,
+    Matrix,
+    Scalar,
+    Tensor,
+)
 from dap3d_core.model import Group
 
 #: Columns of ``rows``: place of the change among the numbers of the loops, of the first entry of
@@ -41,20 +46,6 @@ def _real() -> Scalar[float]:
 class JumpArrays(Arrays):
     """Elements that jump, and scratch of the law; m rows at the most, 6 n + 6 velocities."""
 
-    types: ClassVar[dict[str, Any]] = {
-        "integer": INTEGERS,
-        **dict.fromkeys(("rows", "kicks", "resets"), INTEGER_MATRIX),
-        **dict.fromkeys(
-            ("bodies", "of_switch", "order", "reset_order", "jumps", "which", "pushes", "acts",
-             "acting", "is_touched"),
-            INTEGERS,
-        ),
-        **dict.fromkeys(
-            ("switches", "v", "given", "G", "scaled", "x", "held", "A", "Lam", "touched"), MATRIX
-        ),
-        "space": Array(FLOAT, 3),
-    }  # fmt: skip
-
     soon = _real()  # s, what closes within it is closed
     work = _real()  # of all impulses, J
     exchanged = _real()  # sum of the magnitudes of its parts, J
@@ -69,17 +60,17 @@ class JumpArrays(Arrays):
 
     real: Floats
     integer: Integers
-    rows: Integers
-    kicks: Integers
-    resets: Integers
+    rows: IntegerMatrix
+    kicks: IntegerMatrix
+    resets: IntegerMatrix
     bodies: Integers  # of slots
     of_switch: Integers  # switches of elements
     order: Integers  # switch of each number that the loops of impulses read; the same of resets
     reset_order: Integers
     jumps: Integers  # (switches,) 1 where velocities may jump as it changes its sign
-    switches: Floats
-    v: Floats
-    given: Floats  # rows, global axes, and behind each its change
+    switches: Matrix
+    v: Matrix
+    given: Matrix  # rows, global axes, and behind each its change
     numbers: Floats  # that the loops write, of impulses or states
     counts: Floats  # scratch of the loops
     of_loop: Floats
@@ -87,20 +78,20 @@ class JumpArrays(Arrays):
     which: Integers  # (m,) row of each row of the round: in ``rows``; -1 of one that is given
     pushes: Integers  # (m,)
     acts: Integers
-    G: Floats  # (m, 6 n + 6) rows of the round, global axes; behind each its change
-    scaled: Floats  # (m, 6 n + 6) of unit length in the metric of the masses
-    x: Floats  # (m, 6 n + 6) changes of scaled velocities by unit impulses of them
-    held: Floats  # (m, rows) impulses of the joints then
-    A: Floats
-    Lam: Floats  # (4, m) changes, impulses, scratch
-    space: Floats
+    G: Matrix  # (m, 6 n + 6) rows of the round, global axes; behind each its change
+    scaled: Matrix  # (m, 6 n + 6) of unit length in the metric of the masses
+    x: Matrix  # (m, 6 n + 6) changes of scaled velocities by unit impulses of them
+    held: Matrix  # (m, rows) impulses of the joints then
+    A: Matrix
+    Lam: Matrix  # (4, m) changes, impulses, scratch
+    space: Tensor
     length: Floats
     P: Floats  # (6 n + 6,)
     solution: Floats  # (6 n + 6 + rows,)
     residual: Floats
     nu: Floats
     acting: Integers  # (elements,) 1 where it has acted
-    touched: Floats  # rows that push and have taken part
+    touched: Matrix  # rows that push and have taken part
     is_touched: Integers
 
 

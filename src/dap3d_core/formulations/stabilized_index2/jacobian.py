@@ -24,14 +24,14 @@ its derivatives, called slopes, by the directions.
 """
 
 import math
-from typing import Any, ClassVar
+from typing import Annotated, Any
 
 import attrs
 
 from dap3d_core.assembly.arrays import Floats, Integers, System
 from dap3d_core.assembly.evaluate import largest, zero
 from dap3d_core.assembly.metric import in_body_axes, scaled_moment
-from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, Arrays
+from dap3d_core.kernels.runtime.array_struct import Arrays, IntegerMatrix
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop
 from dap3d_core.kernels.runtime.loop_support import A, P, R, V, W
@@ -70,14 +70,8 @@ PLACE, BODY, FIRST_ROW, ROW_COUNT = range(4)
 class StateTangent(Arrays):
     """Tables and derivatives of elements with states of their own (state_tangent.py)."""
 
-    types: ClassVar[dict[str, Any]] = {
-        "at": INTEGERS,
-        "records": INTEGER_MATRIX,
-        "record": INTEGERS,
-    }
-
     at: Integers  # (groups,) of ``elements``: place of the first state in idx, or -1
-    records: Integers  # (elements, 8) COUNT, ...
+    records: IntegerMatrix  # (elements, 8) COUNT, ...
     record: Integers  # (states,) of the element whose first state it is
     values: Floats
 
@@ -86,25 +80,16 @@ class StateTangent(Arrays):
 class Tangent(Arrays):
     """Tables of the elements, and the derivatives that they give."""
 
-    types: ClassVar[dict[str, Any]] = {
-        "elements": INTEGER_MATRIX,
-        "pairs": INTEGERS,
-        "blocks": INTEGER_MATRIX,
-        "readings": INTEGER_MATRIX,
-        "states": StateTangent.type_of(),
-        "wide": LoopArrays.type_of(),
-    }
-
-    elements: Integers  # (groups, ELEMENT_WIDTH); ROW_AT: place of the joint's row in idx
+    elements: IntegerMatrix  # (groups, ELEMENT_WIDTH); ROW_AT: place of the joint's row in idx
     pairs: Integers  # places in ``coupling`` for the slots (a, b) of each element, -1 for none
-    blocks: Integers  # (pairs, 3) place in ``coupling``, body of the rows, body of the columns
+    blocks: IntegerMatrix  # (pairs, 3) place in ``coupling``, body of the rows, body of the columns
     coupling: Floats
     turning: Floats  # (block_size,)
-    readings: Integers  # (k, 4) of each instance, joint that it reads, slot: PLACE, BODY, ...
+    readings: IntegerMatrix  # (k, 4) of each instance, joint that it reads, slot: PLACE, BODY, ...
     force_by_lambda: Floats  # blocks of ``readings``
     bends: Floats  # (1,) 0, MAY_BEND or BENT
     states: StateTangent
-    wide: Any  # LoopArrays of the differentiated loops, as the next ones
+    wide: Annotated[Any, LoopArrays]  # of the differentiated loops, as the next ones
     D: Floats  # (WIDTH block_size,) an element's own blocks
     gamma: Floats  # (WIDTH rows,)
     nu: Floats  # (WIDTH rows,)

@@ -15,7 +15,7 @@ so that a body has twelve unknowns.
 A row without a position level has mu = 0 as its equation.
 """
 
-from typing import Any, ClassVar
+from typing import Any
 
 import attrs
 
@@ -53,7 +53,7 @@ from dap3d_core.formulations.stabilized_index2.state_tangent import (
     WIDTH_OF,
     fill_states,
 )
-from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays
+from dap3d_core.kernels.runtime.array_struct import Arrays, IntegerMatrix, Matrix
 from dap3d_core.kernels.runtime.cache import compiled
 
 
@@ -61,37 +61,19 @@ from dap3d_core.kernels.runtime.cache import compiled
 class StageMatrix(Arrays):
     """Layout of s - J, and data of the state that it belongs to."""
 
-    types: ClassVar[dict[str, Any]] = {
-        **dict.fromkeys(
-            (
-                "nodes",
-                "columns",
-                "updates",
-                "block_place",
-                "joint_place",
-                "read_place",
-                "state_nodes",
-                "state_places",
-            ),
-            INTEGER_MATRIX,
-        ),
-        **dict.fromkeys(("body_first", "body_place", "pair_place", "held"), INTEGERS),
-        "spin": MATRIX,
-    }
-
-    nodes: Integers  # of linear.lu.LuPlan, as the next two
-    columns: Integers
-    updates: Integers
+    nodes: IntegerMatrix  # of linear.lu.LuPlan, as the next two
+    columns: IntegerMatrix
+    updates: IntegerMatrix
     body_first: Integers  # (n + 1,) first unknown of each body
     body_place: Integers  # (n + 1,) its diagonal block
     pair_place: Integers  # (pairs,) block of each pair of Tangent.blocks
-    block_place: Integers  # (b, 3) of each block of D: (joint, body), (body, joint), first unknown
-    joint_place: Integers  # (joint nodes, 3) diagonal block, rows, first row
-    read_place: Integers  # (k, 3) of Tangent.readings: block, rows of its joint node, first row
-    state_nodes: Integers  # as of ``fill_states``, as the next one
-    state_places: Integers
+    block_place: IntegerMatrix  # (b, 3) of blocks of D: (joint, body), (body, joint), unknown
+    joint_place: IntegerMatrix  # (joint nodes, 3) diagonal block, rows, first row
+    read_place: IntegerMatrix  # (k, 3) of readings: block, rows of its joint node, first row
+    state_nodes: IntegerMatrix  # as of ``fill_states``, as the next one
+    state_places: IntegerMatrix
     held: Integers  # (row_size,) 1 where a row has a position level
-    spin: Floats  # (n + 1, 15): L^T [w' x] U / 2 by rows; L^T w'; U^T w'
+    spin: Matrix  # (n + 1, 15): L^T [w' x] U / 2 by rows; L^T w'; U^T w'
     D: Floats  # (block_size,)
     compliance: Floats  # (row_size,) what regularises the rows
 
@@ -244,8 +226,7 @@ def keep_frames(body: Floats, frames: Floats) -> None:
 def scale_residual(
     R: Floats,
     rows: Floats,
-    blocks: Integers,
-    metric: Floats,
+    system: System,
     matrix: StageMatrix,
     frames: Floats,
     x: Floats,
@@ -255,6 +236,7 @@ def scale_residual(
 
     n: (bodies + 1,) the parts along the Euler parameters.
     """
+    blocks, metric = system.blocks, system.metric
     count = metric.shape[0] - 1
     for b in range(1, count + 1):
         c, f, o = coordinate_offset(b), velocity_offset(b, count), matrix.body_first[b]
@@ -302,14 +284,14 @@ def find_length(s: Any, x: Any, n: Any, matrix: StageMatrix) -> None:
 def unscale_solution(
     x: Floats,
     n: Floats,
-    blocks: Integers,
-    metric: Floats,
+    system: System,
     matrix: StageMatrix,
     frames: Floats,
     out: Floats,
     rows: Floats,
 ) -> None:
     """A solution x as a change of y (13 n + 1,) and of the multipliers (2, rows)."""
+    blocks, metric = system.blocks, system.metric
     count = metric.shape[0] - 1
     for b in range(1, count + 1):
         c, f, o = coordinate_offset(b), velocity_offset(b, count), matrix.body_first[b]

@@ -11,7 +11,7 @@ whose notation this is written) and III.7.
 
 import math
 from collections.abc import Container, Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import attrs
 import numpy as np
@@ -53,7 +53,7 @@ from dap3d_core.integrators.stepping.step_control import (
 )
 from dap3d_core.integrators.stepping.vector_ops import all_finite, scaled_beyond, scaled_largest
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.kernels.runtime.array_struct import MATRIX, Scalar
+from dap3d_core.kernels.runtime.array_struct import Matrix, Scalar
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.kernels.scalar_math import where, with_slopes
 
@@ -90,20 +90,15 @@ def _error_constants() -> Floats:
 class AdamsState(IntegrationState):
     """State of an integration by Adams methods; n components."""
 
-    types: ClassVar[dict[str, Any]] = {
-        **IntegrationState.types,
-        **dict.fromkeys(("differences", "scaled", "table"), MATRIX),
-    }
-
     next_order = Scalar[int]("integer")
     last_order = Scalar[int]("integer")
     equal_steps = Scalar[int]("integer")  # in a row, the coming one included
     is_starting = Scalar[int]("integer")
     failure_count = Scalar[int]("integer")  # of the coming step, in a row
 
-    differences: Floats  # (ROWS, n) Phi_j at t, HNW (III.5.8)
-    scaled: Floats  # (ROWS, n) Phi*_j = beta_j Phi_j; in the last row the rates at the prediction
-    table: Floats  # (TABLE_ROWS, ROWS + HIGHEST)
+    differences: Matrix  # (ROWS, n) Phi_j at t, HNW (III.5.8)
+    scaled: Matrix  # (ROWS, n) Phi*_j = beta_j Phi_j; in the last row the rates at the prediction
+    table: Matrix  # (TABLE_ROWS, ROWS + HIGHEST)
 
 
 def allowed_adams_integers(found: Mapping[str, int]) -> dict[str, Container[int]]:

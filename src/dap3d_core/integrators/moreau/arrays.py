@@ -1,7 +1,7 @@
 """What a step works on: bodies, the contacts near, rows of joints, and scratch of the solution."""
 
 import itertools
-from typing import Any, ClassVar
+from typing import Any
 
 import attrs
 import numpy as np
@@ -15,7 +15,12 @@ from dap3d_core.assembly.collisions.placed_shapes import (
 from dap3d_core.formulations.contacts.contact_table import ContactTable
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays, Scalar
+from dap3d_core.kernels.runtime.array_struct import (
+    Arrays,
+    IntegerMatrix,
+    Matrix,
+    Scalar,
+)
 from dap3d_core.model import Model
 
 #: Contacts that there is room for at first, besides those declared.
@@ -59,29 +64,6 @@ class StepArrays(Arrays):
     A step reads nothing of it that it did not write, but for what the last one leaves for reports.
     """
 
-    types: ClassVar[dict[str, Any]] = {
-        **dict.fromkeys(
-            ("integer", "key", "kind", "under", "group", "next_contact", "chosen", "collides",
-             "machine", "next_body", "row_owner", "rows", "next_row", "declared_gap",
-             "declared_mode", "declared_kind", "declared_turns", "declared_law", "declared_under",
-             "declared_at", "load_row",
-             "load_count", "load_pushes", "held",
-             "row_start", "row_body", "row_place", "used", "place", "parent", "queue", "order",
-             "entry_start", "entries", "bits", "slots", "exchanged"),
-            INTEGERS,
-        ),
-        **dict.fromkeys(("bodies", "first", "declared_bodies", "declared_place"), INTEGER_MATRIX),
-        **dict.fromkeys(
-            ("poses", "Jp", "Jp_inverse", "spin", "spin_inverse", "before", "free", "v", "delta",
-             "trial", "rest", "trial_rest", "end", "path", "J", "moved", "own", "own_held",
-             "x", "u", "z", "B", "B_factored", "push", "kept", "met", "D", "declared_x", "log",
-             "felt", "answer", "missing", "bounce", "v_bounce", "x_bounce",
-             "carried", "bias"),
-            MATRIX,
-        ),
-        "shapes": PlacedShapes.type_of(),
-    }  # fmt: skip
-
     # of the step
     contact_count = _integer()
     touch_count = _integer()  # the first ones, of shapes
@@ -121,32 +103,32 @@ class StepArrays(Arrays):
     integer: Integers
     real: Floats
     # of bodies, with ground first
-    poses: Floats  # (n + 1, POSE) where contacts are sought
+    poses: Matrix  # (n + 1, POSE) where contacts are sought
     margin: Floats  # m
     shape_reach: Floats  # m, how far shapes reach from the mass centre
     mass: Floats
     mass_inverse: Floats  # zero of ground
-    carried: Floats  # (n + 1, 2) 1/kg, 1/(kg m^2) of what joints hold at a body far lighter, or 0
-    Jp: Floats  # (n + 1, 9), and its inverse; in global axes
-    Jp_inverse: Floats
-    spin: Floats
-    spin_inverse: Floats
-    before: Floats  # (n + 1, 6) velocities at the start, without contacts, with them; scratch
-    free: Floats
-    v: Floats
-    delta: Floats  # what it changes by within a round
-    trial: Floats
-    rest: Floats
-    trial_rest: Floats
-    end: Floats  # at the end of the step
-    path: Floats  # means of velocities of motion without contacts, with accelerations ``pushed``
+    carried: Matrix  # (n + 1, 2) 1/kg, 1/(kg m^2) of what joints hold at a body far lighter, or 0
+    Jp: Matrix  # (n + 1, 9), and its inverse; in global axes
+    Jp_inverse: Matrix
+    spin: Matrix
+    spin_inverse: Matrix
+    before: Matrix  # (n + 1, 6) velocities at the start, without contacts, with them; scratch
+    free: Matrix
+    v: Matrix
+    delta: Matrix  # what it changes by within a round
+    trial: Matrix
+    rest: Matrix
+    trial_rest: Matrix
+    end: Matrix  # at the end of the step
+    path: Matrix  # means of velocities of motion without contacts, with accelerations ``pushed``
     hit: Floats  # the part of the step at which a body is hit
     flies: Floats  # the part of its change without contacts that these do not bear else
-    bounce: Floats  # (n + 1, 5) of each group (restitution.py)
-    v_bounce: Floats  # (n + 1, 6), (c, 3), (k,) what bounces lead to
-    x_bounce: Floats
+    bounce: Matrix  # (n + 1, 5) of each group (restitution.py)
+    v_bounce: Matrix  # (n + 1, 6), (c, 3), (k,) what bounces lead to
+    x_bounce: Matrix
     machine: Integers  # the least body of those that joints connect
-    first: Integers  # (n + 1, 3) first body, contact and row of each group, or -1; what follows one
+    first: IntegerMatrix  # (n + 1, 3) first body, contact, row of each group, or -1; the next ones
     next_body: Integers
     used: Integers  # bodies of a group that is solved, in the order of K; the place of each, or -1
     place: Integers
@@ -157,7 +139,7 @@ class StepArrays(Arrays):
     entry_start: Integers  # (n + 2,) first of the blocks of K below the diagonal of each column
     entries: Integers  # their rows
     # of contacts
-    bodies: Integers  # (c, 2) i and j, ground 0
+    bodies: IntegerMatrix  # (c, 2) i and j, ground 0
     key: Integers  # a number that a contact keeps
     kind: Integers  # CONE, ALONE or WHOLE
     under: Integers  # the contact whose rolling it resists, or -1
@@ -166,28 +148,28 @@ class StepArrays(Arrays):
     chosen: Integers  # contacts of a group that is solved
     collides: Integers  # STOPS, BOUNCES, STAYS or 0; the part of the step at which it closes
     closing: Floats
-    J: Floats  # (c, 36) rows of the velocity of body i less that of j: normal, tangents
-    moved: Floats  # the same times M^-1
-    own: Floats  # (c, 9) J M^-1 J^T of each
-    own_held: Floats  # the same with what joints answer
+    J: Matrix  # (c, 36) rows of the velocity of body i less that of j: normal, tangents
+    moved: Matrix  # the same times M^-1
+    own: Matrix  # (c, 9) J M^-1 J^T of each
+    own_held: Matrix  # the same with what joints answer
     gap: Floats
     mu: Floats  # of the cone
     rim: Floats  # friction besides, N s
     e: Floats
-    bias: Floats  # (c, 3) m/s, added to velocities
+    bias: Matrix  # (c, 3) m/s, added to velocities
     r: Floats  # masses that rows feel, kg
-    x: Floats  # (c, 3) impulses, N s; what is projected, its slopes, impulses tried, others kept
-    z: Floats
-    B: Floats
-    B_factored: Floats  # those of K
-    push: Floats
-    kept: Floats
-    missing: Floats  # what they leave of the equations of a round
-    u: Floats  # velocities
-    met: Floats  # (c, MET) contacts that shapes push with
+    x: Matrix  # (c, 3) impulses, N s; what is projected, its slopes, impulses tried, others kept
+    z: Matrix
+    B: Matrix
+    B_factored: Matrix  # those of K
+    push: Matrix
+    kept: Matrix
+    missing: Matrix  # what they leave of the equations of a round
+    u: Matrix  # velocities
+    met: Matrix  # (c, MET) contacts that shapes push with
     # of declared contacts
-    declared_bodies: Integers  # (d, 2)
-    declared_place: Integers  # (d, 6) place in D of the system: row normal of i and j, ...; or -1
+    declared_bodies: IntegerMatrix  # (d, 2)
+    declared_place: IntegerMatrix  # (d, 6) place in D of the system: normal of i and j, ...; -1
     declared_gap: Integers  # in the residual of the system
     declared_mode: Integers  # first state
     declared_kind: Integers
@@ -206,7 +188,7 @@ class StepArrays(Arrays):
     load_row: Integers  # of friction of a joint: its load's first row, their number, whether it
     load_count: Integers  # pushes alone; none where friction is of a size of its own
     load_pushes: Integers
-    declared_x: Floats  # (d, 7) impulses of the last step, modes, directions of slip
+    declared_x: Matrix  # (d, 7) impulses of the last step, modes, directions of slip
     # of rows of joints
     row_owner: Integers  # the machine of each
     next_row: Integers
@@ -214,7 +196,7 @@ class StepArrays(Arrays):
     row_start: Integers  # (k + 1,) first entry of each
     row_body: Integers  # body of each entry, and where its six numbers are in D of the system
     row_place: Integers
-    D: Floats  # (entries, 6)
+    D: Matrix  # (entries, 6)
     s: Floats  # masses that they feel
     y: Floats  # impulses; tried, kept, and of the last step; those of motion without contacts
     lead: Floats  # D v at the begin of a round, less that of motion without contacts, m/s
@@ -230,9 +212,9 @@ class StepArrays(Arrays):
     exchanged: Integers  # rows of K
     change: Floats
     turned: Floats  # (36,)
-    log: Floats  # (room, MET) contacts at instants reported
-    felt: Floats  # (3 c, 3 c) how contacts feel each other with what joints answer, once needed
-    answer: Floats  # (k, 3 c) that
+    log: Matrix  # (room, MET) contacts at instants reported
+    felt: Matrix  # (3 c, 3 c) how contacts feel each other with what joints answer, once needed
+    answer: Matrix  # (k, 3 c) that
     small: Floats  # the matrix of a pass of the problem of contacts alone, and its solution
     small_step: Floats
 

@@ -13,7 +13,7 @@ group closes. Then what overlaps is moved apart.
 """
 
 from collections.abc import Iterator
-from typing import Any, ClassVar
+from typing import Any
 
 import attrs
 import numpy as np
@@ -34,7 +34,7 @@ from dap3d_core.integrators.stepping.integration_state import (
     Y,
 )
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.kernels.runtime.array_struct import MATRIX, Scalar
+from dap3d_core.kernels.runtime.array_struct import Matrix, Scalar
 
 #: Contacts of a shape whose impulses are kept for the next step.
 KEPT = 12
@@ -50,8 +50,6 @@ def _measure() -> Scalar[float]:
 class MoreauState(IntegrationState):
     """State of an integration by time stepping."""
 
-    types: ClassVar[dict[str, Any]] = {**IntegrationState.types, "memory": MATRIX, "pushed": MATRIX}
-
     rate = _measure()  # largest one of the forces without contacts, 1/s; by the last power alone
     last_rate = _measure()
     largest_residual = _measure()  # of all steps, a part of the largest impulse of each
@@ -62,9 +60,9 @@ class MoreauState(IntegrationState):
     overlap_at_start = _measure()  # that of before the first step, m, which moves bodies apart
     overlap_key = _measure()  # of that contact
 
-    memory: Floats  # (room, 5) key of a contact, or -1, its impulse, N s, and its mode
+    memory: Matrix  # (room, 5) key of a contact, or -1, its impulse, N s, and its mode
     pulls: Floats  # impulses of joints, N s, besides those of motion without contacts
-    pushed: Floats  # (n + 1, 6) accelerations by contacts, global axes; 1 in the first item if any
+    pushed: Matrix  # (n + 1, 6) accelerations by contacts, global axes; 1 in the first item if any
     direction: Floats  # a change of the state that forces change at their largest rate
     measures: Floats  # scalars
 

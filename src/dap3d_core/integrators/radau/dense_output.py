@@ -12,9 +12,7 @@ rates are known, and its integral is taken away. What is left is what the error 
 held to (integration.py).
 """
 
-from typing import Any
-
-from dap3d_core.assembly.arrays import VALUE, Floats, System, states_offset, velocity_offset
+from dap3d_core.assembly.arrays import VALUE, Floats, states_offset, velocity_offset
 from dap3d_core.assembly.evaluate import call_kinds, place_state, rates, zero
 from dap3d_core.formulations.common.constraints import (
     PART,
@@ -23,10 +21,8 @@ from dap3d_core.formulations.common.constraints import (
     factorise,
     linearise,
 )
-from dap3d_core.formulations.stabilized_index2.jacobian import Tangent
-from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
 from dap3d_core.integrators.radau.newton import method_index
-from dap3d_core.integrators.radau.state import OLD, OLD_SLOPE, SLOPE, TRIAL_SLOPE, RadauState
+from dap3d_core.integrators.radau.state import OLD, OLD_SLOPE, SLOPE, TRIAL_SLOPE, Given, RadauState
 from dap3d_core.integrators.radau.tableau import FEWEST
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, TRIAL, Y
 from dap3d_core.kernels.runtime.cache import compiled
@@ -41,16 +37,9 @@ STRAY = 5.0
 
 
 @compiled
-def find_slope(
-    t: float,
-    h: float,
-    work: RadauState,
-    system: System,
-    loops: Any,
-    tangent: Tangent,
-    matrix: StageMatrix,
-) -> float:
+def find_slope(t: float, h: float, work: RadauState, given: Given) -> float:
     """dy/dt at the trial state, at t + h, into TRIAL_SLOPE."""
+    system, loops, _tangent, _matrix = given
     t1 = t + h
     y, out = work.state[TRIAL], work.state[TRIAL_SLOPE]
     inverse = work.method.inverse[method_index(work.stages), work.stages - 1]

@@ -5,16 +5,14 @@ Source: as of newton.py.
 
 from typing import Any
 
-from dap3d_core.assembly.arrays import Floats, System
+from dap3d_core.assembly.arrays import Floats
 from dap3d_core.assembly.evaluate import zero
-from dap3d_core.formulations.stabilized_index2.jacobian import Tangent
 from dap3d_core.formulations.stabilized_index2.stage_equations import (
-    StageMatrix,
     evaluate_stage,
     keep_frames,
 )
 from dap3d_core.integrators.radau.newton import evaluate_stages, method_index, solve_first
-from dap3d_core.integrators.radau.state import RadauState
+from dap3d_core.integrators.radau.state import Given, RadauState
 from dap3d_core.integrators.stepping.integration_state import NOISE, SCRATCH, TRIAL, Function, Y
 from dap3d_core.integrators.stepping.rounding import (
     ROUNDINGS,
@@ -28,15 +26,7 @@ from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 
 @compiled
-def estimate_error(
-    t: float,
-    h: float,
-    work: RadauState,
-    system: System,
-    loops: Any,
-    tangent: Tangent,
-    matrix: StageMatrix,
-) -> float:
+def estimate_error(t: float, h: float, work: RadauState, given: Given) -> float:
     """``filter_error`` on the equations of bodies.
 
     The multipliers steer no step: what a run reports of them comes from the reported state. They
@@ -44,14 +34,13 @@ def estimate_error(
     away only as far as its own D is that of the state.
     """
     zero(work.last_multipliers[work.last_stages - 1, 0])
-    return filter_error(t, h, work, system, loops, tangent, matrix, evaluate_first, solve_first)
+    return filter_error(t, h, work, given, evaluate_first, solve_first)
 
 
 @compiled
-def evaluate_first(
-    t: float, y: Floats, work: RadauState, system: System, loops: Any, matrix: StageMatrix
-) -> None:
+def evaluate_first(t: float, y: Floats, work: RadauState, given: Given) -> None:
     """Rates at a state with the last multipliers into R[0]; G[0] is zero."""
+    system, loops, _tangent, matrix = given
     evaluate_stage(t, y, work.last_multipliers[work.last_stages - 1], matrix.held, work.R[0],
                    work.G[0], system, loops)  # fmt: skip
     keep_frames(system.body, work.frames[0])
@@ -61,9 +50,8 @@ def evaluate_first(
 
 @compiled_into
 def filter_error(
-    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: Any, matrix: Any,
-    evaluate: Any, solve: Any,
-) -> float:  # fmt: skip
+    t: float, h: float, work: RadauState, given: Given, evaluate: Any, solve: Any
+) -> float:
     """Norm of the error estimate (HW IV.8, (8.19), (8.20)); 1 is just good enough.
 
     evaluate, solve: ``evaluate_first``, ``solve_first``, or those of other coordinates.
@@ -74,12 +62,12 @@ def filter_error(
     for attempt in range(2 if again else 1):
         for k in range(y.shape[0]):
             argument[k] = y[k] + (work.R[0, k] if attempt == 1 else 0.0)
-        evaluate(t, argument, work, system, loops, matrix)
+        evaluate(t, argument, work, given)
         work.rhs_count += 1
         for i in range(work.stages):
             for k in range(y.shape[0]):
                 work.R[0, k] += e[i] * work.Z[i, k] / h
-        solve(h, work, system, tangent, matrix)
+        solve(h, work, given)
         error = scaled_largest(argument, work.R[0], y, work.state[TRIAL], work.error_size,
                                work.rtol, work.tolerance, h)  # fmt: skip
         if not error >= 1.0:
@@ -88,21 +76,13 @@ def filter_error(
 
 
 @compiled
-def find_work(
-    t: float,
-    h: float,
-    work: RadauState,
-    system: System,
-    loops: Any,
-    tangent: Tangent,
-    matrix: StageMatrix,
-) -> float:
+def find_work(t: float, h: float, work: RadauState, given: Given) -> float:
     """Work done up to each stage, into Z, and up to the end of the step, into the trial state.
 
     The iteration leaves the rates of stages at their last but one values. No error control sees the
     work, so its powers are evaluated once more, at the stages as found.
     """
-    evaluate_stages(t, h, work, system, loops, tangent, matrix)
+    evaluate_stages(t, h, work, given)
     sum_work(h, work)
     return 0.0
 
@@ -119,16 +99,9 @@ def sum_work(h: float, work: RadauState) -> None:
 
 
 @compiled
-def measure_stage_noise(
-    t: float,
-    h: float,
-    work: RadauState,
-    system: System,
-    loops: Any,
-    tangent: Tangent,
-    matrix: StageMatrix,
-) -> float:
+def measure_stage_noise(t: float, h: float, work: RadauState, given: Given) -> float:
     """Uncertainty of dy/dt at (t, y) in a step h, the factors of which are known."""
+    system, loops, _tangent, matrix = given
     y, argument, noise = work.state[Y], work.state[SCRATCH], work.tolerance[NOISE]
     now, changed = work.last_multipliers[work.last_stages - 1], work.multipliers[0]
     e, size = work.method.e[method_index(work.stages)], 0.0
@@ -149,7 +122,7 @@ def measure_stage_noise(
         for r in range(2):
             for k in range(work.G.shape[2]):
                 work.G[0, r, k] -= work.G[1, r, k]
-        solve_first(h, work, system, tangent, matrix)
+        solve_first(h, work, given)
         for k in range(y.shape[0]):
             noise[k] = max(noise[k], size * abs(work.R[0, k]))
     return 0.0

@@ -28,7 +28,7 @@ from dap3d_core.integrators.stepping.integration import Integration, Refusals
 from dap3d_core.integrators.stepping.restore import check_alike, check_pivots, restored
 from dap3d_core.integrators.stepping.rounding import SMALLEST_ATOL
 from dap3d_core.kernels.array_types import Integers
-from dap3d_core.kernels.compiler.types import FLOAT, Signature
+from dap3d_core.kernels.compiler.types import FLOAT, Signature, Tuple
 from dap3d_core.kernels.runtime.cache import table_of
 from dap3d_core.kernels.runtime.function_lists import LOOP_LIST, procedure_signature
 from dap3d_core.linear.lu import LuPlan, StateNode, make_lu_plan
@@ -258,11 +258,12 @@ class RadauIntegration(Integration):
         """The parts of a step as first-class functions, each compiled separately.
 
         A compiled function that calls another one takes in its code, and optimises it again; calls
-        by pointer keep the parts apart: part(t, h, work, system, loops, tangent, matrix). The
-        tangent stands by itself: no derivative of a run needs its derivatives, as the iteration
+        by pointer keep the parts apart: part(t, h, work, (system, loops, tangent, matrix)).
+        The tangent stands by itself: no derivative of a run needs its derivatives, as the iteration
         converges to the same stages with any.
         """
-        kinds = (RadauState.type_of(), System.type_of(), LOOP_LIST, *self.tangent_kinds)
+        given = Tuple((System.type_of(), LOOP_LIST, *self.tangent_kinds))
+        kinds = RadauState.type_of(), given
         tangents = table_of(procedure_signature(*kinds), (self.parts[0],), values_alone=True)
         signature = Signature((FLOAT, FLOAT, *kinds), FLOAT)
         return table_of(signature, self.parts[1:]), tangents

@@ -8,12 +8,12 @@ Python nor an exported model has. It only has to let the iteration converge.
 
 import math
 from collections.abc import Iterator
-from typing import Any, ClassVar
+from typing import Any
 
 import attrs
 import numpy as np
 
-from dap3d_core.assembly.arrays import LENGTH, STEP, Floats, Integers, System
+from dap3d_core.assembly.arrays import LENGTH, STEP, Floats, System
 from dap3d_core.assembly.evaluate import zero
 from dap3d_core.formulations.stabilized_index2.jacobian import BENT, MAY_BEND
 from dap3d_core.integrators.radau.convergence import size_of_change
@@ -30,12 +30,16 @@ from dap3d_core.integrators.radau.newton import (
     subtract_slope,
     unite,
 )
-from dap3d_core.integrators.radau.state import TRIAL_SLOPE, RadauState
+from dap3d_core.integrators.radau.state import TRIAL_SLOPE, Given, RadauState
 from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.integration_state import NOISE, OTHER, SCRATCH, TRIAL, Y
 from dap3d_core.integrators.stepping.rounding import ROUNDINGS, SAMPLES, change_digits
 from dap3d_core.kernels.compiler.types import Table
-from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, MATRIX, Arrays
+from dap3d_core.kernels.runtime.array_struct import (
+    Arrays,
+    IntegerMatrix,
+    Matrix,
+)
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.kernels.scalar_math import is_differentiated
 from dap3d_core.linear.lu import StateNode, factor_lu, make_lu_plan, solve_lu
@@ -56,22 +60,15 @@ LEAST_RATE = 1e-2
 class RateTangent(Arrays):
     """df/dy, and the elimination program of a dense matrix."""
 
-    types: ClassVar[dict[str, Any]] = {
-        **dict.fromkeys(("nodes", "columns", "updates"), INTEGER_MATRIX),
-        "J": MATRIX,
-    }
-
-    nodes: Integers  # of linear.lu.LuPlan, as the next two
-    columns: Integers
-    updates: Integers
+    nodes: IntegerMatrix  # of linear.lu.LuPlan, as the next two
+    columns: IntegerMatrix
+    updates: IntegerMatrix
     bends: Floats  # (1,) as of ``Tangent``
-    J: Floats  # (N, N) of all components but the work
+    J: Matrix  # (N, N) of all components but the work
 
 
 @compiled
-def find_rate_tangent(
-    work: RadauState, system: System, loops: Any, tangent: RateTangent, functions: Any
-) -> None:
+def find_rate_tangent(work: RadauState, given: Given) -> None:
     """The tangent at the predicted end of the step, as ``find_tangent``.
 
     Once an iteration failed, of differences over steps of many lengths the steepest are taken:
@@ -79,6 +76,7 @@ def find_rate_tangent(
     the damping of a cable does where it becomes taut and a motion starts anew, has no slope: that
     on its other side is taken.
     """
+    system, loops, tangent, functions = given
     rhs, y, J, bends = functions[0], work.state[SCRATCH], tangent.J, tangent.bends
     f, changed, length = work.state[TRIAL], work.state[OTHER], system.settings[LENGTH]
     at = work.t + work.tangent_step if work.has_last_step != 0 else work.t
@@ -150,11 +148,9 @@ def fill_dense(s: Any, K: Any, J: Floats) -> None:
 
 
 @compiled
-def factorise_rates(
-    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: RateTangent,
-    functions: Any,
-) -> float:  # fmt: skip
+def factorise_rates(t: float, h: float, work: RadauState, given: Given) -> float:
     """As ``factorise_both``."""
+    tangent = given[2]
     poles = work.method.poles[method_index(work.stages)]
     nodes, columns, updates = tangent.nodes, tangent.columns, tangent.updates
     work.factorisation_count += 1
@@ -171,11 +167,9 @@ def factorise_rates(
 
 
 @compiled
-def evaluate_rates(
-    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: RateTangent,
-    functions: Any,
-) -> None:  # fmt: skip
+def evaluate_rates(t: float, h: float, work: RadauState, given: Given) -> None:
     """Residuals F - A^-1 Z / h of the stages into R."""
+    system, loops, _tangent, functions = given
     rhs, y, argument = functions[0], work.state[Y], work.state[SCRATCH]
     m = method_index(work.stages)
     for i in range(work.stages):
@@ -187,10 +181,9 @@ def evaluate_rates(
 
 
 @compiled
-def solve_rates(
-    h: float, work: RadauState, system: System, tangent: RateTangent, functions: Any
-) -> None:
+def solve_rates(h: float, work: RadauState, given: Given) -> None:
     """R from the residuals of the stages to the changes; that of the work is none."""
+    tangent = given[2]
     stages, m = work.stages, method_index(work.stages)
     separate(work.method.T_inverse[m], stages, work.R, work.xr, work.xc)
     solve_lu(tangent.nodes, tangent.columns, work.K, work.pivots, work.xr)
@@ -215,32 +208,26 @@ def change_rates(h: float, work: RadauState, system: System) -> float:
 
 
 @compiled
-def find_rate_stages(
-    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: RateTangent,
-    functions: Any,
-) -> float:  # fmt: skip
+def find_rate_stages(t: float, h: float, work: RadauState, given: Given) -> float:
     """As ``find_stages``."""
-    shorter = iterate_stages(t, h, work, system, loops, tangent, functions, evaluate_rates,
-                             solve_rates, change_rates)  # fmt: skip
+    shorter = iterate_stages(t, h, work, given, evaluate_rates, solve_rates, change_rates)
     if shorter == 0.0 and is_differentiated():
-        find_slopes(t, h, work, system, loops, tangent, functions, evaluate_rates, solve_rates)
+        find_slopes(t, h, work, given, evaluate_rates, solve_rates)
     return shorter
 
 
 @compiled
-def evaluate_rate(
-    t: float, y: Floats, work: RadauState, system: System, loops: Any, functions: Any
-) -> None:
+def evaluate_rate(t: float, y: Floats, work: RadauState, given: Given) -> None:
     """Rates at a state into R[0]."""
+    system, loops, _tangent, functions = given
     rhs = functions[0]
     rhs(t, y, work.R[0], system, loops)
 
 
 @compiled
-def solve_rate(
-    h: float, work: RadauState, system: System, tangent: RateTangent, functions: Any
-) -> None:
+def solve_rate(h: float, work: RadauState, given: Given) -> None:
     """R[0] from a residual to the change, with the real matrix."""
+    tangent = given[2]
     x, residual = work.xr, work.R[0]
     for k in range(x.shape[0]):
         x[k] = residual[k]
@@ -251,20 +238,15 @@ def solve_rate(
 
 
 @compiled
-def estimate_rate_error(
-    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: RateTangent,
-    functions: Any,
-) -> float:  # fmt: skip
+def estimate_rate_error(t: float, h: float, work: RadauState, given: Given) -> float:
     """As ``estimate_error``."""
-    return filter_error(t, h, work, system, loops, tangent, functions, evaluate_rate, solve_rate)
+    return filter_error(t, h, work, given, evaluate_rate, solve_rate)
 
 
 @compiled
-def find_rate_slope(
-    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: RateTangent,
-    functions: Any,
-) -> float:  # fmt: skip
+def find_rate_slope(t: float, h: float, work: RadauState, given: Given) -> float:
     """dy/dt at the trial state, into TRIAL_SLOPE."""
+    system, loops, _tangent, functions = given
     rhs = functions[0]
     work.rhs_count += 1
     rhs(t + h, work.state[TRIAL], work.state[TRIAL_SLOPE], system, loops)
@@ -272,11 +254,9 @@ def find_rate_slope(
 
 
 @compiled
-def measure_rate_noise(
-    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: RateTangent,
-    functions: Any,
-) -> float:  # fmt: skip
+def measure_rate_noise(t: float, h: float, work: RadauState, given: Given) -> float:
     """As ``measure_stage_noise``."""
+    system, loops, _tangent, functions = given
     rhs, y, argument = functions[0], work.state[Y], work.state[SCRATCH]
     noise = work.tolerance[NOISE]
     m, size = method_index(work.stages), 0.0
@@ -290,19 +270,16 @@ def measure_rate_noise(
         rhs(t, argument, work.R[0], system, loops)
         for k in range(y.shape[0]):
             work.R[0, k] -= work.R[1, k]
-        solve_rate(h, work, system, tangent, functions)
+        solve_rate(h, work, given)
         for k in range(y.shape[0]):
             noise[k] = max(noise[k], size * abs(work.R[0, k]))
     return 0.0
 
 
 @compiled
-def find_rate_work(
-    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: RateTangent,
-    functions: Any,
-) -> float:  # fmt: skip
+def find_rate_work(t: float, h: float, work: RadauState, given: Given) -> float:
     """As ``find_work``."""
-    evaluate_rates(t, h, work, system, loops, tangent, functions)
+    evaluate_rates(t, h, work, given)
     sum_work(h, work)
     return 0.0
 

@@ -14,9 +14,8 @@ from dap3d_core.assembly.arrays import Floats, System, velocity_offset
 from dap3d_core.assembly.evaluate import largest, place, zero
 from dap3d_core.assembly.state_update import add_displacement, add_velocity
 from dap3d_core.formulations.common.constraints import linearise
-from dap3d_core.formulations.stabilized_index2.jacobian import BENT, Tangent, differentiate
+from dap3d_core.formulations.stabilized_index2.jacobian import BENT, differentiate
 from dap3d_core.formulations.stabilized_index2.stage_equations import (
-    StageMatrix,
     add_transposed,
     couple_length,
     evaluate_stage,
@@ -40,7 +39,7 @@ from dap3d_core.integrators.radau.convergence import (
     is_stalled,
     size_of_change,
 )
-from dap3d_core.integrators.radau.state import RadauState
+from dap3d_core.integrators.radau.state import Given, RadauState
 from dap3d_core.integrators.radau.tableau import FEWEST
 from dap3d_core.integrators.stepping.integration_state import SCRATCH, Y
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
@@ -64,9 +63,7 @@ LARGEST = 1.7976931348623157e308
 
 
 @compiled
-def find_tangent(
-    work: RadauState, system: System, loops: Any, tangent: Tangent, matrix: StageMatrix
-) -> None:
+def find_tangent(work: RadauState, given: Given) -> None:
     """The tangent of the step ``work.tangent_step`` at its end as predicted.
 
     ``work.tangent_is_current`` is 0 after it where it is not finite.
@@ -75,6 +72,7 @@ def find_tangent(
     most: on the governor of A05 the iteration converges 20 times faster than with the tangent at
     the start of the step, three times faster than with that of its middle.
     """
+    system, loops, tangent, matrix = given
     argument = work.state[SCRATCH]
     for k in range(argument.shape[0]):
         argument[k] = work.state[Y, k] + work.Z[work.stages - 1, k]
@@ -114,16 +112,9 @@ def pole(poles: Floats, p: int, h: float) -> Any:
 
 
 @compiled
-def factorise_both(
-    t: float,
-    h: float,
-    work: RadauState,
-    system: System,
-    loops: Any,
-    tangent: Tangent,
-    matrix: StageMatrix,
-) -> float:
+def factorise_both(t: float, h: float, work: RadauState, given: Given) -> float:
     """Factors of the real and the complex systems of a step h; 0, or UNFOUND if one is singular."""
+    system, _loops, tangent, matrix = given
     poles = work.method.poles[method_index(work.stages)]
     work.factorisation_count += 1
     work.factored_step = h
@@ -190,19 +181,16 @@ def predict(h: float, work: RadauState, prolong: bool, system: System) -> None:
 
 
 @compiled
-def solve_first(
-    h: float, work: RadauState, system: System, tangent: Tangent, matrix: StageMatrix
-) -> None:
+def solve_first(h: float, work: RadauState, given: Given) -> None:
     """R[0], G[0] from the residual of one equation with the real matrix to the change."""
+    system, _loops, _tangent, matrix = given
     x, along = work.x[0], work.along[0]
     s = work.method.poles[method_index(work.stages), 0] / h
-    scale_residual(work.R[0], work.G[0], system.blocks, system.metric, matrix, work.frames[0],
-                   x, along)  # fmt: skip
+    scale_residual(work.R[0], work.G[0], system, matrix, work.frames[0], x, along)
     couple_length(s, x, along, matrix)
     solve_lu(matrix.nodes, matrix.columns, work.K, work.pivots, x)
     find_length(s, x, along, matrix)
-    unscale_solution(x, along, system.blocks, system.metric, matrix, work.frames[0], work.R[0],
-                     work.G[0])  # fmt: skip
+    unscale_solution(x, along, system, matrix, work.frames[0], work.R[0], work.G[0])
 
 
 @compiled
@@ -234,15 +222,13 @@ def unite(T: Floats, stages: int, real: Floats, pairs: Any, x: Floats) -> None:
 
 
 @compiled
-def solve_stages(
-    h: float, work: RadauState, system: System, tangent: Tangent, matrix: StageMatrix
-) -> None:
+def solve_stages(h: float, work: RadauState, given: Given) -> None:
     """R, G from the residuals of the stages to the changes."""
+    system, _loops, _tangent, matrix = given
     x, along, stages, m = work.x, work.along, work.stages, method_index(work.stages)
     poles, T, inverse = work.method.poles[m], work.method.T[m], work.method.T_inverse[m]
     for i in range(stages):
-        scale_residual(work.R[i], work.G[i], system.blocks, system.metric, matrix, work.frames[i],
-                       x[i], along[i])  # fmt: skip
+        scale_residual(work.R[i], work.G[i], system, matrix, work.frames[i], x[i], along[i])
     separate(inverse, stages, x, work.xr, work.xc)
     separate(inverse, stages, along, work.alongr, work.alongc)
     s = poles[0] / h
@@ -257,8 +243,7 @@ def solve_stages(
     unite(T, stages, work.xr, work.xc, x)
     unite(T, stages, work.alongr, work.alongc, along)
     for i in range(stages):
-        unscale_solution(x[i], along[i], system.blocks, system.metric, matrix, work.frames[i],
-                         work.R[i], work.G[i])  # fmt: skip
+        unscale_solution(x[i], along[i], system, matrix, work.frames[i], work.R[i], work.G[i])
 
 
 @compiled
@@ -275,11 +260,9 @@ def subtract_slope(i: int, h: float, inverse: Floats, work: RadauState) -> None:
 
 
 @compiled
-def evaluate_stages(
-    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: Tangent,
-    matrix: StageMatrix,
-) -> None:  # fmt: skip
+def evaluate_stages(t: float, h: float, work: RadauState, given: Given) -> None:
     """Residuals of the stages: F - A^-1 Z / h into R, those of the rows into G."""
+    system, loops, _tangent, matrix = given
     y, argument, m = work.state[Y], work.state[SCRATCH], method_index(work.stages)
     stages, inverse, c = work.Z, work.method.inverse[m], work.method.c[m]
     for i in range(work.stages):
@@ -340,23 +323,18 @@ def most_iterations(stages: int) -> int:
 
 
 @compiled
-def find_stages(
-    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: Tangent,
-    matrix: StageMatrix,
-) -> float:  # fmt: skip
+def find_stages(t: float, h: float, work: RadauState, given: Given) -> float:
     """``iterate_stages`` on the equations of bodies."""
-    shorter = iterate_stages(t, h, work, system, loops, tangent, matrix, evaluate_stages,
-                             solve_stages, change_stages)  # fmt: skip
+    shorter = iterate_stages(t, h, work, given, evaluate_stages, solve_stages, change_stages)
     if shorter == 0.0 and is_differentiated():
-        find_slopes(t, h, work, system, loops, tangent, matrix, evaluate_stages, solve_stages)
+        find_slopes(t, h, work, given, evaluate_stages, solve_stages)
     return shorter
 
 
 @compiled_into
 def find_slopes(
-    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: Any, matrix: Any,
-    evaluate: Any, solve: Any,
-) -> None:  # fmt: skip
+    t: float, h: float, work: RadauState, given: Given, evaluate: Any, solve: Any
+) -> None:
     """Derivatives of the stages, whose values are found: the iteration goes on for them alone.
 
     evaluate, solve: as of ``iterate_stages``. It stopped by values, which may be right from the
@@ -366,8 +344,8 @@ def find_slopes(
     stages, moves, found, changes = work.Z, work.R, work.multipliers, work.G
     before = LARGEST
     for done in range(MOST_OF_SLOPES):
-        evaluate(t, h, work, system, loops, tangent, matrix)
-        solve(h, work, system, tangent, matrix)
+        evaluate(t, h, work, given)
+        solve(h, work, given)
         work.rhs_count -= work.stages
         change = change_of_slopes(work)
         for i in range(work.stages):
@@ -383,9 +361,8 @@ def find_slopes(
 
 @compiled_into
 def iterate_stages(
-    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: Any, matrix: Any,
-    evaluate: Any, solve: Any, change_by: Any,
-) -> float:  # fmt: skip
+    t: float, h: float, work: RadauState, given: Given, evaluate: Any, solve: Any, change_by: Any
+) -> float:
     """Newton's iteration for the stages of a step h.
 
     evaluate, solve, change_by: as ``evaluate_stages``, ``solve_stages``, ``change_stages``.
@@ -394,6 +371,7 @@ def iterate_stages(
         0 where they are found; else the factor on the step that is to be tried; NaN where a number
         is not finite.
     """
+    tangent = given[2]
     limit, fixed = work.newton_limit, work.fixed_step != 0.0
     stale = abs(h - work.factored_step) / h  # factors of another step converge at this rate
     work.convergence_factor = max(max(work.convergence_factor, EPSILON) ** 0.8, stale)
@@ -401,9 +379,9 @@ def iterate_stages(
     most = MOST_FIXED if fixed else most_iterations(work.stages)
     least = 2 if tangent.bends[0] == BENT else 1  # rates of other steps say nothing across a bend
     for done in range(1, most + 1):
-        evaluate(t, h, work, system, loops, tangent, matrix)
-        solve(h, work, system, tangent, matrix)
-        change = change_by(h, work, system)
+        evaluate(t, h, work, given)
+        solve(h, work, given)
+        change = change_by(h, work, given[0])
         work.iteration_count, work.last_iterations = work.iteration_count + 1, done
         if not change <= LARGEST:
             return math.nan

@@ -1,21 +1,21 @@
 """The state of an implicit integration: arrays that the compiled core reads and writes."""
 
 from collections.abc import Container
-from typing import Any, ClassVar
+from typing import Any
 
 import attrs
 
+from dap3d_core.assembly.arrays import System
 from dap3d_core.integrators.radau.tableau import MOST_STAGES, RadauMethod
 from dap3d_core.integrators.stepping.integration_state import MOST_COUNTED, STATES, IntegrationState
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import (
-    COMPLEX_MATRIX,
-    INTEGER_MATRIX,
-    MATRIX,
-    TENSOR,
+    ComplexMatrix,
+    IntegerMatrix,
+    Matrix,
     Scalar,
+    Tensor,
 )
-from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
 
 # Rows of ``state`` behind those of stepping/integration_state.py: state before the last step, dy/dt
 # at Y, there, and at the trial state.
@@ -47,6 +47,10 @@ ALLOWED: dict[str, Container[int]] = {
     "dense_degree": range(TERMS),
 }
 
+#: What a part of a step is given: system, loops, tangent, and the matrix of the stages; in joint
+#: coordinates functions in place of the matrix.
+Given = tuple[System, Any, Any, Any]
+
 
 def _own() -> Scalar[float]:
     return Scalar("own")
@@ -63,17 +67,6 @@ class RadauState(IntegrationState):
     n = 13 bodies + 1 components, R rows, N unknowns, up to S stages, P pairs of complex poles; mu
     and lambda are the two multipliers of each row, C and D v - nu its two residuals.
     """
-
-    types: ClassVar[dict[str, Any]] = {
-        **IntegrationState.types,
-        **dict.fromkeys(("pivots", "counts"), INTEGER_VECTOR),
-        "pivotsc": INTEGER_MATRIX,
-        **dict.fromkeys(("k", "terms", "Z", "Z_old", "F", "R", "x", "along"), MATRIX),
-        "tolerances": MATRIX,
-        **dict.fromkeys(("multipliers", "last_multipliers", "G", "frames"), TENSOR),
-        **dict.fromkeys(("xc", "alongc", "Kc"), COMPLEX_MATRIX),
-        "method": RadauMethod.type_of(),
-    }
 
     convergence_factor = _own()  # eta and Theta of HW II, IV.8, (8.10)
     convergence_rate = _own()
@@ -103,28 +96,28 @@ class RadauState(IntegrationState):
     singular_refusals = _integer()
 
     own: Floats  # scalars
-    k: Floats  # (2, n) for the first step
-    terms: Floats  # (TERMS, n)
+    k: Matrix  # (2, n) for the first step
+    terms: Matrix  # (TERMS, n)
     nodes: Floats  # (TERMS,) of dense output, in Newton's form
-    tolerances: Floats  # (orders, ATOL + n) RTOL, ...
+    tolerances: Matrix  # (orders, ATOL + n) RTOL, ...
     counts: Integers  # (3,) coordinates, their rates, states of elements
     blamed: Floats  # (n,) how often each changed most where the iteration did not converge
-    Z: Floats  # (S, n) stages less the state
-    Z_old: Floats  # (S, n) of the last accepted step
-    F: Floats  # (S, n) rates at the stages
-    R: Floats  # (S, n) residuals; then changes
-    multipliers: Floats  # (S, 2, R) at the stages
-    last_multipliers: Floats  # (S, 2, R) of the last accepted step
-    G: Floats  # (S, 2, R) residuals of the rows; then changes
-    frames: Floats  # (S, bodies + 1, 13) axes and Euler parameters of the bodies at the stages
-    x: Floats  # (S, N) residuals, changes in the unknowns of the matrix
-    along: Floats  # (S, bodies + 1) their parts along the Euler parameters
+    Z: Matrix  # (S, n) stages less the state
+    Z_old: Matrix  # (S, n) of the last accepted step
+    F: Matrix  # (S, n) rates at the stages
+    R: Matrix  # (S, n) residuals; then changes
+    multipliers: Tensor  # (S, 2, R) at the stages
+    last_multipliers: Tensor  # (S, 2, R) of the last accepted step
+    G: Tensor  # (S, 2, R) residuals of the rows; then changes
+    frames: Tensor  # (S, bodies + 1, 13) axes and Euler parameters of the bodies at the stages
+    x: Matrix  # (S, N) residuals, changes in the unknowns of the matrix
+    along: Matrix  # (S, bodies + 1) their parts along the Euler parameters
     xr: Floats  # (N,) of the real system
     alongr: Floats  # (bodies + 1,)
-    xc: Any  # (P, N) complex
-    alongc: Any  # (P, bodies + 1) complex
+    xc: ComplexMatrix  # (P, N) complex
+    alongc: ComplexMatrix  # (P, bodies + 1) complex
     K: Floats  # (matrix_size,)
-    Kc: Any  # (P, matrix_size) complex
+    Kc: ComplexMatrix  # (P, matrix_size) complex
     pivots: Integers  # (N,)
-    pivotsc: Integers  # (P, N)
+    pivotsc: IntegerMatrix  # (P, N)
     method: RadauMethod

@@ -18,7 +18,7 @@ from dap3d_core.integrators.radau.dense_output import dense_state, prepare_dense
 from dap3d_core.integrators.radau.error import bound_stage_noise
 from dap3d_core.integrators.radau.newton import SAME_STEP, method_index, most_iterations, predict
 from dap3d_core.integrators.radau.order import change_order, lower_order, raise_order
-from dap3d_core.integrators.radau.state import OLD, OLD_SLOPE, SLOPE, TRIAL_SLOPE, RadauState
+from dap3d_core.integrators.radau.state import OLD, OLD_SLOPE, SLOPE, TRIAL_SLOPE, Given, RadauState
 from dap3d_core.integrators.radau.tableau import FEWEST
 from dap3d_core.integrators.stepping.event_location import (
     end_is_across,
@@ -81,6 +81,7 @@ def advance(
     budget: int,
 ) -> None:
     """Integrate until more than ``budget`` stages are evaluated, the rows are full, or the end."""
+    given = system, loops, tangent, matrix
     rhs, project, report = functions[0], functions[1], functions[2]
     watch = functions[4] if work.switch_count != 0 else rhs
     accepted = functions[3] if work.calls_accepted != 0 else rhs
@@ -91,11 +92,11 @@ def advance(
             tangent.bends[0] = 0.0
             start(work, rhs, project, system, loops)
         else:
-            step(work, parts, tangents, (project, accepted, watch), system, loops, tangent, matrix)
+            step(work, parts, tangents, (project, accepted, watch), given)
             h = work.factored_step
             if work.rounding_state != 0 and h > 0.0 and can_measure(work, rejected):
                 measure = parts[4]
-                measure(work.t, h, work, system, loops, tangent, matrix)
+                measure(work.t, h, work, given)
                 bound_stage_noise(h, work, rhs, system, loops)
         if work.calls_accepted != 0 and work.step_count > steps:
             count_turns(work, accepted, system, loops)
@@ -129,16 +130,10 @@ def start(work: RadauState, rhs: Function, project: Function, system: System, lo
 
 @compiled
 def step(
-    work: RadauState,
-    parts: Sequence[Any],
-    tangents: Sequence[Any],
-    functions: Any,
-    system: System,
-    loops: Any,
-    tangent: Tangent,
-    matrix: StageMatrix,
+    work: RadauState, parts: Sequence[Any], tangents: Sequence[Any], functions: Any, given: Given
 ) -> None:
     """Try one step: accept it, reject it, or stop the run; functions: project, accepted, watch."""
+    system, loops, _tangent, _matrix = given
     project, accepted, watch = functions
     estimate_error, find_slope, find_work = parts[2], parts[3], parts[5]
     state, adaptive, t = work.state, work.fixed_step == 0.0, work.t
@@ -149,7 +144,7 @@ def step(
         if h == 0.0:
             return
         t1 = t1 if h == longest else t + h
-    shorter = search(t, h, work, parts, tangents, system, loops, tangent, matrix)
+    shorter = search(t, h, work, parts, tangents, given)
     if shorter != 0.0:
         reject_iteration(work, t1, h, shorter)
         return
@@ -157,12 +152,12 @@ def step(
         return
     for k in range(state.shape[1]):
         state[TRIAL, k] = state[Y, k] + work.Z[work.stages - 1, k]
-    error = estimate_error(t, h, work, system, loops, tangent, matrix) if adaptive else 0.0
+    error = estimate_error(t, h, work, given) if adaptive else 0.0
     if error < 1.0:
-        find_work(t, h, work, system, loops, tangent, matrix)
+        find_work(t, h, work, given)
         failure = project_state(work, t1, state[TRIAL], project, system, loops)
         if failure == RUNNING:
-            find_slope(t, h, work, system, loops, tangent, matrix)
+            find_slope(t, h, work, given)
             failure = complete_step(work, t1, h, watch, system, loops)
         if failure == RUNNING:
             failure = judge_turns(work, t1, accepted, system, loops)
@@ -198,55 +193,36 @@ def stage_is_across(
 
 
 @compiled
-def search(
-    t: float,
-    h: float,
-    work: RadauState,
-    parts: Sequence[Any],
-    tangents: Sequence[Any],
-    system: System,
-    loops: Any,
-    tangent: Tangent,
-    matrix: StageMatrix,
-) -> float:
+def search(t: float, h: float, work: RadauState, parts: Any, tangents: Any, given: Given) -> float:
     """Predict and find the stages of a step h, by up to three attempts; as find_stages."""
+    system, _loops, tangent, _matrix = given
     predict(h, work, True, system)
-    shorter = iterate(t, h, work, parts, tangents, system, loops, tangent, matrix)
+    shorter = iterate(t, h, work, parts, tangents, given)
     if shorter > 0.0 and work.convergence_rate < HOPELESS:  # once more, with the tangent at the end
         work.tangent_needed = 1
-        shorter = iterate(t, h, work, parts, tangents, system, loops, tangent, matrix)
+        shorter = iterate(t, h, work, parts, tangents, given)
     if shorter > 0.0 and tangent.bends[0] == BENT:  # the prediction may lie beyond the bend
         predict(h, work, False, system)
         work.tangent_needed = 1
-        shorter = iterate(t, h, work, parts, tangents, system, loops, tangent, matrix)
+        shorter = iterate(t, h, work, parts, tangents, given)
     if shorter != 0.0 and work.tangent_is_current != 0:
         tangent.bends[0] = max(tangent.bends[0], MAY_BEND)
     return shorter
 
 
 @compiled
-def iterate(
-    t: float,
-    h: float,
-    work: RadauState,
-    parts: Sequence[Any],
-    tangents: Sequence[Any],
-    system: System,
-    loops: Any,
-    tangent: Tangent,
-    matrix: StageMatrix,
-) -> float:
+def iterate(t: float, h: float, work: RadauState, parts: Any, tangents: Any, given: Given) -> float:
     """Find the stages from their present values, with a new tangent if needed; as find_stages."""
     factorise_both, find_stages, find_tangent = parts[0], parts[1], tangents[0]
     wrong = 0.0
     if work.tangent_needed != 0:
         work.tangent_step = h
-        find_tangent(work, system, loops, tangent, matrix)
+        find_tangent(work, given)
         wrong = 0.0 if work.tangent_is_current != 0 else math.nan
     if wrong == 0.0 and not abs(h - work.factored_step) <= SAME_STEP * h:
-        wrong = factorise_both(t, h, work, system, loops, tangent, matrix)
+        wrong = factorise_both(t, h, work, given)
     if wrong == 0.0:
-        wrong = find_stages(t, h, work, system, loops, tangent, matrix)
+        wrong = find_stages(t, h, work, given)
     return wrong
 
 

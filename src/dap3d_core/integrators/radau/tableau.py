@@ -9,13 +9,12 @@ Appl. Math. 111, 1999), and their code RADAU.
 """
 
 from functools import cache
-from typing import Any, ClassVar
+from typing import Any
 
 import attrs
 import numpy as np
 
-from dap3d_core.kernels.array_types import Floats
-from dap3d_core.kernels.runtime.array_struct import MATRIX, TENSOR, Arrays
+from dap3d_core.kernels.runtime.array_struct import Arrays, Matrix, Tensor
 
 #: Numbers of stages; a method of s stages has order 2 s - 1, and its error estimate order s.
 STAGES = (3, 5, 7)
@@ -174,19 +173,14 @@ class RadauMethod(Arrays):
     [[alpha, -beta], [beta, alpha]].
     """
 
-    types: ClassVar[dict[str, Any]] = {
-        **dict.fromkeys(("c", "e", "bulge", "poles"), MATRIX),
-        **dict.fromkeys(("A", "inverse", "T", "T_inverse"), TENSOR),
-    }
-
-    c: Floats  # (3, 7) abscissae
-    A: Floats  # (3, 7, 7); its last row holds the weights
-    inverse: Floats  # (3, 7, 7) A^-1
-    T: Floats  # (3, 7, 7)
-    T_inverse: Floats  # (3, 7, 7)
-    e: Floats  # (3, 7) weights of the stages in the error estimate
-    bulge: Floats  # (3, 7) integrals of (x - c_1) ... (x - c_s) up to c_i over its value at 0
-    poles: Floats  # (3, 7) gamma, then alpha and beta of each pair
+    c: Matrix  # (3, 7) abscissae
+    A: Tensor  # (3, 7, 7); its last row holds the weights
+    inverse: Tensor  # (3, 7, 7) A^-1
+    T: Tensor  # (3, 7, 7)
+    T_inverse: Tensor  # (3, 7, 7)
+    e: Matrix  # (3, 7) weights of the stages in the error estimate
+    bulge: Matrix  # (3, 7) integrals of (x - c_1) ... (x - c_s) up to c_i over its value at 0
+    poles: Matrix  # (3, 7) gamma, then alpha and beta of each pair
 
 
 @cache

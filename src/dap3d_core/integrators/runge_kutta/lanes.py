@@ -5,7 +5,7 @@ right-hand side beside those of stages are its own (step.py): its numbers are th
 A step near a singular pose is taken as that of a run alone.
 """
 
-from typing import Any, ClassVar
+from typing import Any
 
 import attrs
 
@@ -32,8 +32,7 @@ from dap3d_core.integrators.stepping.singular_poses import (
 from dap3d_core.integrators.stepping.step_control import count_turns, end_of_step, first_step
 from dap3d_core.integrators.stepping.switch_values import count_from_far_edges
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
-from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays
+from dap3d_core.kernels.runtime.array_struct import Arrays, Matrix
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: What a lane does: nothing; it takes a step; the rates of its trial state are known; its step is
@@ -47,11 +46,6 @@ ALL = 10**15
 class Lanes(Arrays):
     """Steps of L runs of n components; the vectors have a number for each lane."""
 
-    types: ClassVar[dict[str, Any]] = {
-        **dict.fromkeys(("does", "rejected"), INTEGER_VECTOR),
-        **dict.fromkeys(("y", "out", "outcome", "switches"), MATRIX),
-    }
-
     does: Integers
     rejected: Integers  # steps of the run that had failed before this one
     h: Floats  # the run's next step, as it was chosen before this one
@@ -61,10 +55,10 @@ class Lanes(Arrays):
     error: Floats
     t: Floats  # arguments and results of functions of all lanes (formulations/wide_rates.py)
     bound: Floats
-    y: Floats  # (n, L)
-    out: Floats  # (n, L)
-    outcome: Floats  # (m, L)
-    switches: Floats  # (s, L)
+    y: Matrix  # (n, L)
+    out: Matrix  # (n, L)
+    outcome: Matrix  # (m, L)
+    switches: Matrix  # (s, L)
 
 
 @compiled

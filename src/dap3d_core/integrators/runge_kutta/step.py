@@ -135,7 +135,7 @@ def step(work: RungeKuttaState, functions: Any, system: Any, loops: Any) -> None
     if h < longest:
         t1 = work.t + h
     near = work.projects != 0 and is_near_singularity(work, longest)
-    if not take_stages(work, t1, h, near, rhs, project, watch, system, loops):
+    if not take_stages(work, t1, h, near, functions, system, loops):
         return
     error = step_error(work, t1, h, near, project, system, loops)
     finish_step(work, t1, h, longest, end, near, error, False, functions, system, loops)
@@ -181,9 +181,9 @@ def finish_step(
 
     has_rates: f at t1 and the trial state is known already, in the stage behind those of the step.
     """
-    rhs, project, accepted, watch = functions
+    accepted = functions[2]
     if error <= 1.0:
-        failure = complete_step(work, t1, near, has_rates, rhs, project, watch, system, loops)
+        failure = complete_step(work, t1, near, has_rates, functions, system, loops)
         if failure == RUNNING:
             failure = judge_turns(work, t1, accepted, system, loops)
         if failure == STEP_CUT:
@@ -253,21 +253,14 @@ def error_above_rounding(work: RungeKuttaState, near: bool, h: float, error: flo
 
 @compiled
 def take_stages(
-    work: RungeKuttaState,
-    t1: float,
-    h: float,
-    near: bool,
-    rhs: Function,
-    project: Function,
-    watch: Function,
-    system: Any,
-    loops: Any,
+    work: RungeKuttaState, t1: float, h: float, near: bool, functions: Any, system: Any, loops: Any
 ) -> bool:
     """Stages and trial state of a step to t1; each on the constraints if ``near``.
 
     False where one of them lies beyond a switch, or at a singular state: then the step is cut.
     """
     k, table = work.k, work.table
+    rhs, project, _, watch = functions
     stages, watched = work.stage_count, work.switch_count != 0
     last = stages if work.error_uses_last_stage != 0 else stages - 1
     for i in range(1, stages + 1):
@@ -384,9 +377,7 @@ def complete_step(
     t1: float,
     near: bool,
     has_rates: bool,
-    rhs: Function,
-    project: Function,
-    watch: Function,
+    functions: Any,
     system: Any,
     loops: Any,
 ) -> int:
@@ -398,6 +389,7 @@ def complete_step(
     has_rates: as of ``finish_step``.
     """
     times, k = work.times, work.k
+    rhs, project, _, watch = functions
     trial, result = work.state[TRIAL], work.stage_count
     known, watched = work.error_uses_last_stage != 0, work.switch_count != 0
     here, controlled = known and not near, work.fixed_step == 0.0 and not near
@@ -407,7 +399,7 @@ def complete_step(
             if not has_rates:
                 rhs(t1, trial, k[result], system, loops)
             known = True
-        if not take_dense_stages(work, t1, near, rhs, project, watch, system, loops):
+        if not take_dense_stages(work, t1, near, functions, system, loops):
             return STEP_CUT
         work.rhs_count += k.shape[0] - 1 - result
         here = here and k.shape[0] == result + 1
@@ -439,17 +431,11 @@ def complete_step(
 
 @compiled
 def take_dense_stages(
-    work: RungeKuttaState,
-    t1: float,
-    near: bool,
-    rhs: Function,
-    project: Function,
-    watch: Function,
-    system: Any,
-    loops: Any,
+    work: RungeKuttaState, t1: float, near: bool, functions: Any, system: Any, loops: Any
 ) -> bool:
     """The further stages that dense output needs; False as for ``take_stages``."""
     t, argument, table, k = work.t, work.state[SCRATCH], work.table, work.k
+    rhs, project, _, watch = functions
     watched = work.switch_count != 0
     for i in range(work.stage_count + 1, k.shape[0]):
         at = t + table[i, ABSCISSA] * (t1 - t)

@@ -3,13 +3,12 @@
 import math
 from collections.abc import Callable, Container
 from enum import IntEnum
-from typing import Any, ClassVar
+from typing import Any
 
 import attrs
 
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
-from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays, Scalar
+from dap3d_core.kernels.runtime.array_struct import Arrays, Matrix, Scalar
 
 #: ``f(t, y, out, system, loops)``: rhs, project, report, accepted or watch (runge_kutta/step.py).
 Function = Callable[..., None]
@@ -75,11 +74,6 @@ class IntegrationState(Arrays):
     Numbers are in ``real`` and ``integer`` in this order, in checkpoints as well. Those of the
     step-size controller are explained at ``Tableau``.
     """
-
-    types: ClassVar[dict[str, Any]] = {
-        "integer": INTEGER_VECTOR,
-        **dict.fromkeys(("state", "rows", "switches", "crossings", "tolerance", "stops"), MATRIX),
-    }
 
     # settings
     rtol = _real()
@@ -162,12 +156,12 @@ class IntegrationState(Arrays):
     real: Floats  # (MEASURES + m,) scalars; m singularity measures that project gives
     integer: Integers  # scalars
     times: Floats  # (nt,) reporting times, increasing, t0 first and t_end last
-    state: Floats  # (STATES, n)
-    rows: Floats  # (capacity, 1 + n + report_size) rows t, y, report that wait to be taken
-    switches: Floats  # (SWITCH_ROWS, q) of q switches of the model (event_location.py)
-    crossings: Floats  # (LOGGED, 3) where they changed their sign; no row without switches
-    tolerance: Floats  # (TOLERANCES, n)
-    stops: Floats  # (STOP_ROWS, s) instants that no step crosses (break_points.py)
+    state: Matrix  # (STATES, n)
+    rows: Matrix  # (capacity, 1 + n + report_size) rows t, y, report that wait to be taken
+    switches: Matrix  # (SWITCH_ROWS, q) of q switches of the model (event_location.py)
+    crossings: Matrix  # (LOGGED, 3) where they changed their sign; no row without switches
+    tolerance: Matrix  # (TOLERANCES, n)
+    stops: Matrix  # (STOP_ROWS, s) instants that no step crosses (break_points.py)
     limits: Floats  # scalars
 
 

@@ -13,18 +13,22 @@ that item, assigning to it stores there, in Python and in compiled code.
 """
 
 from collections.abc import Iterator
-from typing import Any, ClassVar, Generic, TypeVar, overload
+from typing import Annotated, Any, ClassVar, Generic, TypeVar, get_args, get_origin, overload
 
 import attrs
 import numpy as np
 
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.compiler.intrinsics import intrinsic
 from dap3d_core.kernels.compiler.types import COMPLEX, DTYPES, FLOAT, INT, Array, Struct
 from dap3d_core.kernels.compiler.units import address_of
 
-VECTOR, MATRIX, TENSOR = Array(FLOAT, 1), Array(FLOAT, 2), Array(FLOAT, 3)
-INTEGERS, INTEGER_MATRIX = Array(INT, 1), Array(INT, 2)
-COMPLEX_VECTOR, COMPLEX_MATRIX = Array(COMPLEX, 1), Array(COMPLEX, 2)
+VECTOR = Array(FLOAT, 1)
+#: Annotations of members that are no vectors: ``Floats`` and ``Integers`` are (array_types.py).
+Matrix = Annotated[Floats, Array(FLOAT, 2)]
+Tensor = Annotated[Floats, Array(FLOAT, 3)]
+IntegerMatrix = Annotated[Integers, Array(INT, 2)]
+ComplexMatrix = Annotated[Any, Array(COMPLEX, 2)]
 Number = TypeVar("Number", float, int)
 
 
@@ -57,12 +61,11 @@ class Scalar(Generic[Number]):
 class Arrays:
     """Base of classes whose members are C-contiguous arrays, or further such classes.
 
-    ``types`` gives the type of each member that is not a vector of float64. A member that is a
-    class of arrays may be None where nothing reads it. Subclasses are frozen, but for those with
-    scalars: their arrays are bound once.
+    The annotation of a member gives its type. One that is a class of arrays may be None where
+    nothing reads it: ``Annotated[Any, CLASS]``. Subclasses are frozen, but for those with scalars:
+    their arrays are bound once.
     """
 
-    types: ClassVar[dict[str, Any]] = {}
     #: By name; those of base classes first.
     scalars: ClassVar[dict[str, Scalar[Any]]] = {}
     _table: Any = attrs.field(init=False, repr=False)
@@ -110,7 +113,7 @@ class Arrays:
         """The type of the class in compiled code."""
         found: Struct | None = cls.__dict__.get("_type")
         if found is None:
-            members = [(f.name, cls.types.get(f.name, VECTOR)) for f in attrs.fields(cls) if f.init]
+            members = [(f.name, _member_type(f.type)) for f in attrs.fields(cls) if f.init]
             scalars = {name: (s.array, s.index) for name, s in cls.scalars.items()}
             found = cls._type = Struct(  # type: ignore[attr-defined]
                 cls.__name__, tuple(members), scalars
@@ -121,6 +124,14 @@ class Arrays:
     def indices(cls, array: str) -> dict[str, int]:
         """Index of each scalar of a member, by name."""
         return {name: s.index for name, s in cls.scalars.items() if s.array == array}
+
+
+def _member_type(annotation: Any) -> Array | Struct:
+    """The type in compiled code of a member with an annotation."""
+    if annotation in (Floats, Integers):
+        return VECTOR if annotation == Floats else Array(INT, 1)
+    given = get_args(annotation)[1] if get_origin(annotation) is Annotated else annotation
+    return given if isinstance(given, Array) else given.type_of()
 
 
 @intrinsic("pointer")

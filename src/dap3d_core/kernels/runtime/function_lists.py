@@ -1,13 +1,14 @@
 """Tables of function addresses, by which the driver calls loops compiled after it."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import attrs
 import numpy as np
 
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.compiler.types import FLOAT, INT, Array, Signature, Table
-from dap3d_core.kernels.runtime.array_struct import INTEGERS, MATRIX, VECTOR, Arrays, pointer
+from dap3d_core.kernels.runtime.array_struct import VECTOR, Arrays, Matrix, pointer
 from dap3d_core.kernels.runtime.cache import compiled, table_of
 
 
@@ -15,14 +16,13 @@ from dap3d_core.kernels.runtime.cache import compiled, table_of
 class LoopArrays(Arrays):
     """Arrays that every group loop reads; the driver's system begins with them."""
 
-    types: ClassVar[dict[str, Any]] = {"body": MATRIX, "F": MATRIX, "idx": INTEGERS}
-
-    body: Any  # (n+1, BODY_WIDTH) state and constants of each body (loop_support.py)
-    F: Any  # (functions+1, 5) functions of time, at t and (the last column) at 0
-    idx: Any  # integers of all instances
-    par: Any  # numbers of all instances
-    states: Any = attrs.field(factory=lambda: np.zeros(0))  # of elements that have some
-    rates: Any = attrs.Factory(lambda self: np.zeros(len(self.states)), takes_self=True)  # of these
+    body: Matrix  # (n+1, BODY_WIDTH) state and constants of each body (loop_support.py)
+    F: Matrix  # (functions+1, 5) functions of time, at t and (the last column) at 0
+    idx: Integers  # integers of all instances
+    par: Floats  # numbers of all instances
+    states: Floats = attrs.field(factory=lambda: np.zeros(0))  # of elements that have some
+    #: Of these.
+    rates: Floats = attrs.Factory(lambda self: np.zeros(len(self.states)), takes_self=True)
 
 
 _OUT = Array(FLOAT, 0)

@@ -20,6 +20,8 @@ rows: it can be factored in any order, whatever the rank of D^ (Vanderbei, Symme
 matrices, SIAM J. Optim. 5, 1995).
 """
 
+from typing import Any
+
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats, Integers
@@ -179,17 +181,9 @@ def subtract_product(
 
 
 @compiled_into
-def eliminate(
-    k: int,
-    m: int,
-    nodes: Integers,
-    columns: Integers,
-    updates: Integers,
-    K: Floats,
-    smallest: Floats,
-    drop: bool,
-) -> int:
+def eliminate(k: int, m: int, program: Any, K: Floats, smallest: Floats, drop: bool) -> int:
     """Eliminate node k, of m rows; returns how many of its pivots were small."""
+    nodes, columns, updates = program
     x, d, sign = nodes[k, 1], nodes[k, 2], float(nodes[k, 3])
     counted = factor_pivot(m, d, sign, K, smallest, x, drop)
     for q in range(nodes[k, 4], nodes[k + 1, 4]):
@@ -237,19 +231,19 @@ def factor(
     Returns:
         number of counted pivots.
     """
-    K, smallest = pointer(K), pointer(smallest)
+    K, smallest, program = pointer(K), pointer(smallest), (nodes, columns, updates)
     counted = 0
     for k in range(nodes.shape[0] - 1):
         m = nodes[k, 0]
         if m == 3:
             if not pass_over(nodes[k, 2], K):
-                counted += eliminate(k, 3, nodes, columns, updates, K, smallest, drop)
+                counted += eliminate(k, 3, program, K, smallest, drop)
         elif m == 5:
-            counted += eliminate(k, 5, nodes, columns, updates, K, smallest, drop)
+            counted += eliminate(k, 5, program, K, smallest, drop)
         elif m >= LEAST_ROWS:
-            counted += factor_panel(k, nodes, columns, updates, K, smallest, drop)
+            counted += factor_panel(k, program, K, smallest, drop)
         else:
-            counted += eliminate(k, m, nodes, columns, updates, K, smallest, drop)
+            counted += eliminate(k, m, program, K, smallest, drop)
     return counted
 
 

@@ -5,6 +5,8 @@ serves four products. Factors are stored as those of small nodes (factor.py), bu
 factored they are those of Cholesky, with inverse diagonal: products then need no third factor.
 """
 
+from typing import Any
+
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats, Integers
@@ -12,19 +14,12 @@ from dap3d_core.kernels.runtime.cache import compiled
 
 
 @compiled
-def factor_panel(
-    k: int,
-    nodes: Integers,
-    columns: Integers,
-    updates: Integers,
-    K: Floats,
-    smallest: Floats,
-    drop: bool,
-) -> int:
-    """Gather, factor and apply node k, a panel; arguments and result as of ``factor``.
+def factor_panel(k: int, program: Any, K: Floats, smallest: Floats, drop: bool) -> int:
+    """Gather, factor and apply node k, a panel; its small pivots. Arguments as of ``factor``.
 
     Its rows stand one after another in K, m numbers each, the diagonal block first.
     """
+    nodes, columns, updates = program
     m, x, d, sign = nodes[k, 0], nodes[k, 1], nodes[k, 2], float(nodes[k, 3])
     q, last = nodes[k, 5], nodes[k + 1, 5]
     while q < last and updates[q, 5] < 0:
@@ -36,9 +31,7 @@ def factor_panel(
         rows += columns[p, 2]
     divide(d + m * m, rows, m, d, K)
     while q < last:
-        flag = updates[q, 5]
-        subtract(updates[q, 0], updates[q, 1], updates[q, 2], updates[q, 3], updates[q, 4],
-                 m, flag >> 1, flag & 1, sign, K)  # fmt: skip
+        subtract(updates[q], m, sign, K)
         q += 1
     store(m, rows, d, sign, K)
     return counted
@@ -145,22 +138,14 @@ def divide(o: int, rows: int, m: int, d: int, K: Floats) -> None:
 
 
 @compiled
-def subtract(
-    a: int,
-    b: int,
-    target: int,
-    rows: int,
-    cols: int,
-    m: int,
-    stride: int,
-    diagonal: int,
-    sign: float,
-    K: Floats,
-) -> None:
+def subtract(update: Integers, m: int, sign: float, K: Floats) -> None:
     """Subtract sign A B^T from the target; of a diagonal one the lower triangle.
 
-    A: rows x m at a; B: cols x m at b; the target's rows are ``stride`` apart (0: cols).
+    update: places of A, of m columns, of B and of the target; its rows and columns; and, as of
+    ``gather``, a flag with the numbers from row to row of the target (0: its columns).
     """
+    a, b, target, rows, cols = update[0], update[1], update[2], update[3], update[4]
+    stride, diagonal = update[5] >> 1, update[5] & 1
     if stride == 0:
         stride = cols
     r = 0

@@ -5,16 +5,14 @@ Before it the loop sets numbers and the initial state, after it it stores rows. 
 are the same bit for bit whichever points ran before it, and as those of ``simulate``.
 """
 
-from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import attrs
 
 from dap3d_core.assembly.arrays import UNSETTLED, System
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
-from dap3d_core.integrators.stepping.integration_state import FINISHED, NOISE, RUNNING, Function, Y
-from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
-from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays
+from dap3d_core.integrators.stepping.integration_state import FINISHED, NOISE, RUNNING, Y
+from dap3d_core.kernels.runtime.array_struct import Arrays, Matrix
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.study.batch.initial_state import LEAST_PIVOT, OPEN, STARTING
@@ -38,25 +36,19 @@ MIN_PIVOT = 1e-10
 class Points(Arrays):
     """k points of a model with n state components; w numbers change from point to point."""
 
-    types: ClassVar[dict[str, Any]] = {
-        **dict.fromkeys(("at", "places", "first_integer"), INTEGER_VECTOR),
-        **dict.fromkeys(("table", "y0", "metric", "rows", "diagnostics"), MATRIX),
-        **dict.fromkeys(("first_switches", "first_lengths"), MATRIX),
-    }
-
     at: Integers  # (4,)
     places: Integers  # (w,) indices in par, body, metric and constants of a tree, concatenated
-    table: Floats  # (k, w) the numbers at these indices
-    y0: Floats  # (k, n) states to start from
-    metric: Floats  # of the model, where its numbers do not change from point to point
+    table: Matrix  # (k, w) the numbers at these indices
+    y0: Matrix  # (k, n) states to start from
+    metric: Matrix  # of the model, where its numbers do not change from point to point
     unit: Floats  # (7,) constants of the metric of displacements at the start
     starting: Floats  # (STARTING + rows + n,) arguments and results of the start (initial_state.py)
     first_real: Floats  # the work as it is before a run
     first_integer: Integers
-    first_switches: Floats
-    first_lengths: Floats
-    rows: Floats  # (k nt, width) reported rows
-    diagnostics: Floats  # (k, COLUMNS)
+    first_switches: Matrix
+    first_lengths: Matrix
+    rows: Matrix  # (k nt, width) reported rows
+    diagnostics: Matrix  # (k, COLUMNS)
 
 
 @compiled
@@ -103,12 +95,7 @@ def reset_work(points: Points, p: int, work: RungeKuttaState) -> None:
 
 @compiled
 def start(
-    points: Points,
-    p: int,
-    work: RungeKuttaState,
-    starting: Sequence[Function],
-    system: System,
-    loops: Any,
+    points: Points, p: int, work: RungeKuttaState, starting: Any, system: System, loops: Any
 ) -> bool:
     """Start the run of point p; returns False if it has to be run individually."""
     diagnostics, metric = points.diagnostics[p], system.metric
@@ -132,12 +119,7 @@ def start(
 
 @compiled
 def store_row(
-    target: Floats,
-    row: Floats,
-    work: RungeKuttaState,
-    starting: Sequence[Function],
-    system: System,
-    loops: Any,
+    target: Floats, row: Floats, work: RungeKuttaState, starting: Any, system: System, loops: Any
 ) -> None:
     """Store a reported row with its state brought to coordinates of bodies."""
     end, length = 1 + work.state.shape[1], target.shape[0]
@@ -148,12 +130,7 @@ def store_row(
 
 @compiled
 def store_run(
-    points: Points,
-    p: int,
-    work: RungeKuttaState,
-    starting: Sequence[Function],
-    system: System,
-    loops: Any,
+    points: Points, p: int, work: RungeKuttaState, starting: Any, system: System, loops: Any
 ) -> None:
     """Store rows and diagnostics of the run of point p, which has ended."""
     diagnostics, nt = points.diagnostics, work.rows.shape[0]

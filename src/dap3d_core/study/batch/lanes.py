@@ -5,7 +5,7 @@ and the bits of its run alone. A lane whose run has ended takes the next point.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import attrs
 import numpy as np
@@ -29,12 +29,11 @@ from dap3d_core.integrators.runge_kutta.lanes import (
     take_projection,
 )
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
-from dap3d_core.integrators.stepping.integration_state import SAMPLE, Function
+from dap3d_core.integrators.stepping.integration_state import SAMPLE
 from dap3d_core.kernels.compiler.trace import TraceError
 from dap3d_core.kernels.compiler.types import INT, CompileError, Table, Tuple
 from dap3d_core.kernels.compiler.units import Entry
-from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
-from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays
+from dap3d_core.kernels.runtime.array_struct import Arrays, Matrix
 from dap3d_core.kernels.runtime.cache import compiled, jit_is_on
 from dap3d_core.kernels.runtime.function_lists import LOOP_LIST
 from dap3d_core.kernels.runtime.lanes import lane_count
@@ -64,22 +63,17 @@ MakeWorks = Callable[[int], Sequence[RungeKuttaState]]
 class LanePoints(Arrays):
     """Points in L lanes, and the numbers of a system that lanes have each for itself."""
 
-    types: ClassVar[dict[str, Any]] = {
-        **dict.fromkeys(("loaded", "point", "has", "places"), INTEGER_VECTOR),
-        **dict.fromkeys(("par", "body", "metric", "constants", "F", "smallest", "kept"), MATRIX),
-    }
-
     loaded: Integers  # (1,) the point whose numbers the system of one scene has
     point: Integers  # (L,) of each lane
     has: Integers  # functions of all lanes that there are (formulations/wide_rates.py)
-    par: Floats  # (numbers, L) each: parts of a system that differ from point to point
-    body: Floats
-    metric: Floats
-    constants: Floats
-    F: Floats
-    smallest: Floats
+    par: Matrix  # (numbers, L) each: parts of a system that differ from point to point
+    body: Matrix
+    metric: Matrix
+    constants: Matrix
+    F: Matrix
+    smallest: Matrix
     places: Integers  # (k,) in par, of what each run changes: states of angles
-    kept: Floats  # (L, k + settings) these, and settings
+    kept: Matrix  # (L, k + settings) these, and settings
 
 
 @compiled
@@ -145,18 +139,9 @@ def load(points: Points, lane_points: LanePoints, k: int, system: System) -> Non
 
 
 @compiled
-def next_step(
-    points: Points,
-    lane_points: LanePoints,
-    k: int,
-    work: RungeKuttaState,
-    lanes: Lanes,
-    functions: Any,
-    starting: Sequence[Function],
-    system: System,
-    loops: Any,
-) -> int:
+def next_step(run: Any, k: int, work: RungeKuttaState) -> int:
     """Choose the next step of a lane, of its point or of the next one; 1 if there is one."""
+    points, lane_points, _works, lanes, _wide, functions, starting, system, loops = run
     at, lanes.does[k] = points.at, IDLE
     while True:
         if lane_points.point[k] == NONE:
@@ -180,20 +165,9 @@ def next_step(
 
 
 @compiled
-def take_stages(
-    points: Points,
-    lane_points: LanePoints,
-    works: Any,
-    lanes: Lanes,
-    wide: Any,
-    functions: Any,
-    system: System,
-    loops: Any,
-) -> None:
-    """Stages and errors of the steps of all lanes; rates of the trial states that are good.
-
-    Arguments as of ``run_lanes``.
-    """
+def take_stages(run: Any) -> None:
+    """Stages and errors of the steps of all lanes; rates of the trial states that are good."""
+    _points, lane_points, works, lanes, wide, functions, _starting, system, loops = run
     table, rates, wide_system, wide_loops = wide
     rhs, project = table[0], functions[1]
     stages = works[0][1].stage_count
@@ -203,7 +177,7 @@ def take_stages(
             if lanes.does[k] > IDLE:
                 asked += put_stage(work, lanes, k, i)
         if asked > 0:
-            watch_stages(points, lane_points, works, lanes, wide, functions, system, loops)
+            watch_stages(run)
             asked = 0
             for k, work in works:
                 if lanes.does[k] > IDLE:
@@ -212,9 +186,7 @@ def take_stages(
             rhs(rates, wide_system, wide_loops)
             for k, work in works:
                 if lanes.does[k] > IDLE:
-                    take_rates(
-                        points, lane_points, work, lanes, k, work.k[i], functions, system, loops
-                    )
+                    take_rates(run, k, work, work.k[i])
     asked = 0
     for k, work in works:
         if lanes.does[k] > IDLE:
@@ -223,8 +195,7 @@ def take_stages(
         rhs(rates, wide_system, wide_loops)
         for k, work in works:
             if lanes.does[k] == HAS_RATES:
-                stage = work.k[stages]
-                take_rates(points, lane_points, work, lanes, k, stage, functions, system, loops)
+                take_rates(run, k, work, work.k[stages])
         if lane_points.has[1] != 0:
             table[1](rates, wide_system, wide_loops)
             for k, work in works:
@@ -233,17 +204,9 @@ def take_stages(
 
 
 @compiled
-def watch_stages(
-    points: Points,
-    lane_points: LanePoints,
-    works: Any,
-    lanes: Lanes,
-    wide: Any,
-    functions: Any,
-    system: System,
-    loops: Any,
-) -> None:
+def watch_stages(run: Any) -> None:
     """Values of the switches at the stages of all lanes, where their steps are sampled."""
+    points, lane_points, works, lanes, wide, functions, _starting, system, loops = run
     table, rates, wide_system, wide_loops = wide
     if works[0][1].sampled_switch_count == 0:
         return
@@ -262,18 +225,9 @@ def watch_stages(
 
 
 @compiled
-def take_rates(
-    points: Points,
-    lane_points: LanePoints,
-    work: RungeKuttaState,
-    lanes: Lanes,
-    k: int,
-    stage: Floats,
-    functions: Any,
-    system: System,
-    loops: Any,
-) -> None:
+def take_rates(run: Any, k: int, work: RungeKuttaState, stage: Floats) -> None:
     """Rates of a lane into a stage; evaluated for it alone where those of all are not valid."""
+    points, lane_points, _works, lanes, _wide, functions, _starting, system, loops = run
     if lanes.bound[k] < 1.0:
         for j in range(stage.shape[0]):
             stage[j] = lanes.out[j, k]
@@ -284,33 +238,23 @@ def take_rates(
 
 
 @compiled
-def run_lanes(
-    points: Points,
-    lane_points: LanePoints,
-    works: Any,
-    lanes: Lanes,
-    wide: Any,
-    functions: Any,
-    starting: Any,
-    system: System,
-    loops: Any,
-    budget: int,
-) -> int:
+def run_lanes(run: Any, budget: int) -> int:
     """Run points until none is left or more than ``budget`` right-hand sides are spent.
 
-    Returns the number of lanes that have not ended. Arguments as of ``run_points`` (driver.py), and
-    of lanes (integrators/runge_kutta/lanes.py); wide: functions of all lanes, in a table, and their
-    arguments (formulations/wide_rates.py).
+    Returns the number of lanes that have not ended.
+
+    run: points, lane_points, works, lanes, wide, functions, starting, system, loops, as of
+    ``run_points`` (driver.py) and of lanes (integrators/runge_kutta/lanes.py); wide: functions of
+    all lanes, in a table, and their arguments (formulations/wide_rates.py).
     """
+    points, lane_points, works, lanes, _wide, functions, _starting, system, loops = run
     spent, active = 0, 1
     while active > 0 and spent <= budget:
         active = 0
         for k, work in works:
-            active += next_step(
-                points, lane_points, k, work, lanes, functions, starting, system, loops
-            )
+            active += next_step(run, k, work)
         if active > 0:
-            take_stages(points, lane_points, works, lanes, wide, functions, system, loops)
+            take_stages(run)
         for k, work in works:
             if lanes.does[k] != IDLE:
                 load(points, lane_points, k, system)
@@ -364,10 +308,12 @@ class LaneBatch:
         work = RungeKuttaState.type_of()
         self._run: Entry = run_lanes.compile(
             [
-                Points.type_of(), LanePoints.type_of(), Tuple((Tuple((INT, work)),) * count),
-                Lanes.type_of(),
-                Tuple((Table(SIGNATURE), *SIGNATURE.arguments)),
-                STEPS, STEPS, System.type_of(), LOOP_LIST, INT,
+                Tuple((
+                    Points.type_of(), LanePoints.type_of(), Tuple((Tuple((INT, work)),) * count),
+                    Lanes.type_of(), Tuple((Table(SIGNATURE), *SIGNATURE.arguments)),
+                    STEPS, STEPS, System.type_of(), LOOP_LIST,
+                )),
+                INT,
             ]
         )  # fmt: skip
 
@@ -386,8 +332,8 @@ class LaneBatch:
         self._wide.spread()
         self._points.loaded[0] = NONE
         self._points.point[:] = NONE
-        own, wide = (points, self._points, self._works, self._lanes), self._wide.call
-        while self._run(*own, wide, *self._arguments, budget):
+        own = points, self._points, self._works, self._lanes, self._wide.call
+        while self._run((*own, *self._arguments), budget):
             pass
 
 

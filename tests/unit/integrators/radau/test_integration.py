@@ -26,7 +26,7 @@ def solve_at(t, h, y, multipliers, work, system, loops, tangent, matrix):
     """The change that belongs to the residual in R[0], G[0], in the axes of y."""
     evaluate_stage(t, y, multipliers, matrix.held, work.R[1], work.G[1], system, loops)
     keep_frames(system.body, work.frames[0])
-    solve_first(h, work, system, tangent, matrix)
+    solve_first(h, work, (system, loops, tangent, matrix))
 
 
 def sprung():
@@ -77,9 +77,9 @@ def test_tangent_is_that_of_all_equations(scene, h):
     work.last_multipliers[2] = base
     work.multipliers[2] = base
     work.tangent_step = h
-    find_tangent(work, system, run.own_loops, run.tangent, matrix)
+    find_tangent(work, (system, run.own_loops, run.tangent, matrix))
     assert work.tangent_is_current
-    assert factorise_both(0.0, h, work, system, evaluator.loops, run.tangent, matrix) == 0.0
+    assert factorise_both(0.0, h, work, (system, evaluator.loops, run.tangent, matrix)) == 0.0
     y0 = run.y
     residual = rng.normal(size=y0.size)
     residual[-1] = 0.0

@@ -10,7 +10,7 @@ from support.internals import COEFFICIENTS, STAGES, radau_method
 def of(k):
     """The tables of a method, without what pads them."""
     m, s = radau_method(), STAGES[k]
-    tables = {name: getattr(m, name)[k] for name in (*m.types, "c")}
+    tables = {name: array[k] for name, array in m.walk()}
     for table in tables.values():
         assert not table[s:].any()
         assert not table[..., s:].any()

@@ -3,7 +3,6 @@ Slopes are compared with complex steps where the function is analytic, else with
 
 import cmath
 import math
-from typing import Any
 
 import attrs
 import numpy as np
@@ -12,11 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.at_all_levels import function_of, made_of, programs, same_bits
 from support.internals import (
-    INTEGERS,
-    MATRIX,
     Arrays,
     CompileError,
     DifferentiatedArrays,
+    Floats,
+    Integers,
+    Matrix,
     Program,
     compiled,
     differentiated,
@@ -235,11 +235,10 @@ def test_a_function_without_a_derivative_is_refused():
 class Drawn(Arrays):
     """What a program drawn at random reads and writes."""
 
-    types = {"m": MATRIX, "n": INTEGERS}  # noqa: RUF012
-    x: Any
-    m: Any
-    n: Any
-    out: Any
+    x: Floats
+    m: Matrix
+    n: Integers
+    out: Floats
 
 
 @pytest.mark.slow

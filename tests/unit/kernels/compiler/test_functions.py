@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from support.at_all_levels import compiled_at_all_levels
-from support.internals import FLOAT, INT, MATRIX, VECTOR, Array, CompileError, Program
+from support.internals import FLOAT, INT, VECTOR, Array, CompileError, Program
 from support.plain import jit_is_on
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
@@ -35,7 +35,7 @@ def used_behind(out):
 def test_items_of_several_types_are_constants_of_the_code():
     """A name of such a loop is no variable, which would be of one type."""
     k = np.arange(9.0).reshape(3, 3)
-    for tried in compiled_at_all_levels(row_sum, (INT, MATRIX, VECTOR)).values():
+    for tried in compiled_at_all_levels(row_sum, (INT, Array(FLOAT, 2), VECTOR)).values():
         for row in range(3):
             wanted, found = np.zeros(3), np.zeros(3)
             row_sum(row, k, wanted)

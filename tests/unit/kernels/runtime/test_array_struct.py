@@ -1,7 +1,5 @@
 """Arrays handed to compiled code by one address, and numbers of them by name."""
 
-from typing import Any, ClassVar
-
 import attrs
 import numpy as np
 import pytest
@@ -9,10 +7,11 @@ from support.at_all_levels import compiled_at_all_levels, function_of
 from support.internals import (
     FLOAT,
     INT,
-    INTEGERS,
-    MATRIX,
     Arrays,
     CompileError,
+    Floats,
+    Integers,
+    Matrix,
     Program,
     Scalar,
     compiled,
@@ -23,22 +22,18 @@ from support.internals import (
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
 class Inner(Arrays):
-    weights: Any
+    weights: Floats
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
 class Base(Arrays):
-    types: ClassVar[dict[str, Any]] = {"table": MATRIX, "count": INTEGERS}
-
-    table: Any
-    count: Any
+    table: Matrix
+    count: Integers
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
 class Whole(Base):
-    types: ClassVar[dict[str, Any]] = Base.types | {"inner": Inner.type_of()}
-
-    values: Any
+    values: Floats
     inner: Inner
 
 
@@ -103,15 +98,13 @@ def test_members_in_order():
 
 @attrs.define(eq=False, kw_only=True, slots=False)
 class Clock(Arrays):
-    types = {"integer": INTEGERS}  # noqa: RUF012
-
     t = Scalar[float]("real")
     ticks = Scalar[int]("integer")
     h = Scalar[float]("real")
     is_running = Scalar[int]("integer")
 
-    real: np.ndarray
-    integer: np.ndarray
+    real: Floats
+    integer: Integers
 
 
 @attrs.define(eq=False, kw_only=True, slots=False)

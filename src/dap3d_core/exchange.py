@@ -1,4 +1,4 @@
-"""``export``: a result as a file of another program."""
+"""The exchange layer: results as files of other programs, by exporters of plugins."""
 
 import os
 from collections.abc import Callable
