@@ -23,7 +23,6 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import (
-    ACCELERATION,
     KNOT,
     SCRATCH,
     SWITCH,
@@ -46,27 +45,24 @@ from dap3d_core.assembly.state_update import size_of_positions, size_of_velociti
 from dap3d_core.formulations.common import constraints
 from dap3d_core.formulations.common.constraints import (
     factorise,
+    linearise,
     power_of_drivers,
     report_levels,
     report_multipliers,
     solve_rows,
-)
-from dap3d_core.formulations.common.independent_rows import (
-    PART_OF_INDEPENDENT,
-    are_independent,
-    turns_little,
 )
 from dap3d_core.formulations.common.projection import project_onto
 from dap3d_core.formulations.contacts.watched_rates import store_watched, take_watched
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.scalar_math import is_differentiated, where
-from dap3d_core.linear.ldlt.factor import scale_blocks
 from dap3d_core.linear.least_squares import invert
 
 #: Compliance of a row as part of its squared length; how much less where passes do not converge,
-#: and the least.
+#: and the least. That of rows that do not depend on each other: no pivot is less than this part of
+#: the square of its row.
 PART, SMALLER, LEAST = 1e-4, 1e-3, 1e-12
+PART_OF_INDEPENDENT, LEAST_PIVOT = 1e-16, 1e-1
 #: Passes at most; each is to leave this part of the one before. They end where they change
 #: multipliers by this part, as the next would by a compliance of that, or by rounding alone, which
 #: rows that depend on each other enlarge. Of shares, too, where some slide: what sticks is not to
@@ -101,19 +97,15 @@ def memory_size(bodies: int, rows: int, contacts: int) -> int:
 def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     """Scaled ``acceleration`` and ``multipliers``; returns the power of forces and drivers."""
     power = evaluate_forces(t, y, system, loops)
-    call_kinds(ACCELERATION, ACCELERATION, t, system, loops, system.D, system.gamma, system.nu)
-    contacts, size, closed = system.contacts, system.acceleration.shape[0], 0
-    for c in range(contacts.shape[0]):
-        closed += 1 if mode_of(system, c) > _OPEN else 0
-    alone = system.row.shape[0] == 3 * contacts.shape[0]
-    sure = alone and closed == 1 and turns_little(system)
-    scale_blocks(system.blocks, system.D, system.metric)
+    linearise(t, system, loops)
     zero(system.multipliers)
-    force = system.friction[size : 2 * size]
+    contacts, size = system.contacts, system.acceleration.shape[0]
+    force, closed = system.friction[size : 2 * size], 0
     for c in range(contacts.shape[0]):
+        closed |= mode_of(system, c) > _OPEN
         if is_given(system, c) or (contacts[c, LOADED] == 1 and is_sliding(system, c)):
             power += force_of(t, c, force, system.acceleration, system, loops)
-    if closed == 0 and alone:
+    if closed == 0 and system.row.shape[0] == 3 * contacts.shape[0]:
         return power
     applied = system.friction[:size]
     for k in range(size):
@@ -121,7 +113,7 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     given = largest_given(system)
     part = PART if given > 0.0 else PART_OF_INDEPENDENT
     factorise(system, part)
-    if given == 0.0 and not (sure or are_independent(system)):
+    if given == 0.0 and not are_independent(system):
         part = PART
         factorise(system, part)
     count = add_columns(t, system, loops)
@@ -395,6 +387,18 @@ def fill_load(system: System, count: int, r: int, A: Floats) -> float:
         same = 1.0 if r == s else 0.0
         A[s] = same + (A[s] - same) / (load if load > 0.0 else 1.0)
     return load - own[own.shape[0] - FORCE] - N[r]
+
+
+@compiled
+def are_independent(system: System) -> bool:
+    """True if the factors, of ``PART_OF_INDEPENDENT``, have no small pivot."""
+    nodes, small = system.nodes, 0
+    for k in range(nodes.shape[0] - 1):
+        m, f, d = nodes[k, 0], nodes[k, 1], nodes[k, 2]
+        for r in range(m if nodes[k, 3] < 0 else 0):
+            of_row = abs(system.K[d + r * (m + 1)]) * system.compliance[f + r]
+            small |= not of_row * LEAST_PIVOT < PART_OF_INDEPENDENT
+    return small == 0
 
 
 @compiled

@@ -25,7 +25,6 @@ import numpy as np
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
-from dap3d_core.kernels.scalar_math import where
 from dap3d_core.linear.ldlt.panels import factor_panel, solve_panel_backwards, solve_panel_forwards
 from dap3d_core.linear.ldlt.plan import COPY, DIAGONAL, PRODUCTS, TRANSPOSE
 from dap3d_core.linear.ordering.ordering import LEAST_ROWS
@@ -130,8 +129,7 @@ def regularise(nodes: Integers, compliance: Floats, K: Floats) -> None:
         m, f, d = nodes[k, 0], nodes[k, 1], nodes[k, 2]
         if nodes[k, 3] < 0:
             for r in range(m):
-                of_row = compliance[f + r]
-                K[d + r * (m + 1)] -= where(of_row != 0.0, of_row, IDLE)
+                K[d + r * (m + 1)] -= compliance[f + r] if compliance[f + r] != 0.0 else IDLE
 
 
 @compiled_into
@@ -142,10 +140,10 @@ def factor_pivot(
     counted = 0
     for c in range(m):
         s = K[d + c * m + c]
-        small = where(sign * s > smallest[x + c], 0, 1)
+        small = not sign * s > smallest[x + c]
         counted += small
-        inverse = 1.0 / where(sign * s > 0.0, s, np.nan)
-        if drop and small == 1:
+        inverse = 1.0 / s if sign * s > 0.0 else np.nan
+        if drop and small:
             inverse = 0.0
         K[d + c * m + c] = inverse
         for r in range(c + 1, m):
