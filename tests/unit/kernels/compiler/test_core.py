@@ -122,7 +122,6 @@ NOT_NEEDED = tuple(
         "formulations.joint.lanes", "integrators.runge_kutta.lanes", "study.batch.lanes",
         "assembly.collisions", "integrators.moreau", "formulations.contacts",
         "formulations.joint_loops.contacts", "linear.least_squares",
-        "formulations.common.independent_rows",
     )
 )  # fmt: skip
 
