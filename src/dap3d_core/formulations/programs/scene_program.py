@@ -176,8 +176,7 @@ def write_program(
         varied: as of ``constants``.
         tracer: records the program; left out, one of as many instructions as it may have.
         others: of a projection, as of ``merged`` (ways.py).
-        count: as of ``write_programs``.
-        is_behind: of a projection, that it is behind the right-hand side of its state.
+        count: as of ``write_programs``. is_behind: of a projection, as of ``results``.
 
     Raises:
         TraceError: the program would be too long, or have too many guards.
@@ -313,7 +312,7 @@ def write_programs(
     entries = evaluator.functions.entries
     found, general = [*programmed(evaluator), *([REPORT] * name.endswith(REPORTS))], {}
     texts, needs, written = list[str](), dict[str, str](), list[int]()
-    is_behind = ALONE not in name
+    first = float(ALONE not in name)
     for k in found:
         general[k] = _named(entries[k])
         head = _rates_head(evaluator, general[k]) if k == RHS else _HEAD
@@ -324,7 +323,6 @@ def write_programs(
             head = _PROJECTION_HEAD.format(first=1.0, project=general[k], arguments=ARGUMENTS)
             texts.append(_BEHIND.format(name=behind, head=head, rhs=general[RHS], size=state.size,
                                         project=general[k], arguments=ARGUMENTS))  # fmt: skip
-            first = float(is_behind)
             head = _PROJECTION_HEAD.format(first=first, project=behind, arguments=ARGUMENTS)
             written.append(BEHIND)
             if count > 1:
@@ -332,7 +330,7 @@ def write_programs(
         of = evaluator, k, time, state, names, head, varied, None
         for ways in (None,) if others is None or k != PROJECT else (others, None):
             try:
-                text, needed = write_program(*of, ways, count, is_behind)
+                text, needed = write_program(*of, ways, count, first == 1.0)
             except TraceError:
                 if k == RHS:
                     raise
