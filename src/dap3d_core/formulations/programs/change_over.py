@@ -84,7 +84,7 @@ class ChangeOver:
         """
         model = evaluator.model
         self._evaluator, self._varied, self._count = evaluator, varied, count
-        #: Names of the programs, by modes of contacts.
+        #: Names of the programs, by modes of contacts, and whether projections are alone.
         self._names: dict[Any, str] = {}
         #: Constants of the programs: where they stand, and their numbers.
         self._parts: list[tuple[Floats, Integers]] = []
@@ -95,6 +95,8 @@ class ChangeOver:
         #: Contacts are read where a report has placed them; programs of reports leave nothing.
         self._takes_reports = count == 1 and not model.contact_count
         self._is_open = jit_is_on() and takes_one and 0 < model.body_count <= MOST_BODIES
+        #: Steps of a fixed length project what they end at before they evaluate it.
+        self._projects_alone = False
 
     def during(self, integration: Any, run: "Callable[[], object]") -> None:
         """Advance an integration, which ``run`` does, by programs where there are some.
@@ -112,6 +114,7 @@ class ChangeOver:
             return integration.t, state
 
         if self._is_open and integration.takes_programs:
+            self._projects_alone = work.fixed_step != 0.0
             self.call(run, self._evaluator.functions.addresses, start, counts)
         else:
             run()
@@ -189,13 +192,16 @@ class ChangeOver:
             self._constants = scene_program.constant_numbers(self._parts)
         if self._constants != scene_program.constant_numbers(self._parts):
             return None
-        name = self._names.get(modes)
+        key = modes, self._projects_alone
+        name = self._names.get(key)
         if name is None:
             of = start()[1].size, self._constants + repr(modes).encode(), self._varied
             name = scene_program.name_of(self._evaluator, *of)
+            if self._projects_alone and scene_program.reads_rates(self._evaluator):
+                name += scene_program.ALONE
             if self._takes_reports and _reported.get(modes, False):
                 name += scene_program.REPORTS
-            self._names[modes] = name
+            self._names[key] = name
         record = _records.get(name)
         if record is not None and not record.is_due:
             return record if record.programs else None

@@ -42,6 +42,9 @@ BEHIND = -1
 ALL_WAYS = -2
 #: End of the names of programs among which there is one of reports.
 REPORTS = "-r"
+#: In the names of those whose projection is of a state whose right-hand side is not known, as at
+#: the ends of steps of a fixed length. Others have it behind the right-hand side of its state.
+ALONE = "-alone"
 #: Instructions of a program, and of that of reports, at most: larger scenes gain less, and take
 #: long to compile.
 MOST_INSTRUCTIONS, MOST_OF_REPORT = 22_000, 10_000
@@ -86,14 +89,15 @@ _WATCHED_HEAD = """  %at = getelementptr inbounds i64, ptr %system, i64 {word}
 known:
   call void @{rhs}({arguments})
   ret void"""
-#: Of a projection at a state whose right-hand side was not the last one evaluated.
+#: Of a projection, where its right-hand side was the last one evaluated, or was not, and its
+#: program is of the other kind.
 _PROJECTION_HEAD = """  %first = load double, ptr %out, align 8
-  %valid = fcmp oeq double %first, 1.0
-  br i1 %valid, label %program, label %alone
-alone:
+  %valid = fcmp oeq double %first, {first}
+  br i1 %valid, label %program, label %other
+other:
   call void @{project}({arguments})
   ret void"""
-#: The general projection behind a general right-hand side, whose program left nothing.
+#: The general projection, behind a general right-hand side where its program left nothing.
 _BEHIND = """
 define void @{name}({arguments}) nounwind {{
 entry:
@@ -120,10 +124,13 @@ def reads_rates(evaluator: Evaluator) -> bool:
     return evaluator.formulation.needs_joints and evaluator.length_count > 0
 
 
-def results(evaluator: Evaluator, k: int, t_now: Any, y: Any, outcome: Any, struct: Any) -> Any:
+def results(
+    evaluator: Evaluator, k: int, t_now: Any, y: Any, outcome: Any, struct: Any,
+    is_behind: bool = True,
+) -> Any:  # fmt: skip
     """What function k of an evaluator gives for symbols; a projection changes y, too.
 
-    outcome: of a projection, which is behind the right-hand side of its state.
+    outcome: of a projection. is_behind: it is behind the right-hand side of its state.
     """
     with run_with_symbols():
         function, loops = evaluator.coordinates.function, python_loops(evaluator)
@@ -136,7 +143,8 @@ def results(evaluator: Evaluator, k: int, t_now: Any, y: Any, outcome: Any, stru
             function(REPORT)(t_now, y, values, struct, loops)
             return values
         rates = np.zeros(y.size, dtype=object)
-        function(RHS)(t_now, y, rates, struct, loops)
+        if k == RHS or is_behind:
+            function(RHS)(t_now, y, rates, struct, loops)
         if k == RHS:
             return rates
         function(PROJECT)(t_now, y, outcome, struct, loops)
@@ -155,6 +163,7 @@ def write_program(
     tracer: StraightLine | None = None,
     others: Sequence[Floats] | None = None,
     count: int = 1,
+    is_behind: bool = True,
 ) -> tuple[str, dict[str, str]]:
     """LLVM IR of the program of one function, and the declarations that it needs.
 
@@ -167,14 +176,14 @@ def write_program(
         varied: as of ``constants``.
         tracer: records the program; left out, one of as many instructions as it may have.
         others: of a projection, as of ``merged`` (ways.py).
-        count: as of ``write_programs``.
+        count: as of ``write_programs``. is_behind: of a projection, as of ``results``.
 
     Raises:
         TraceError: the program would be too long, or have too many guards.
     """
     most = MOST_OF_REPORT if k == REPORT else MOST_INSTRUCTIONS
     tracer = tracer or StraightLine(most)
-    first = np.array([1.0, *np.zeros(OUTCOMES - 1 + evaluator.length_count)])
+    first = np.array([float(is_behind), *np.zeros(OUTCOMES - 1 + evaluator.length_count)])
 
     def trace(state: Floats) -> tuple[Results, Any]:
         system = SymbolicSystem(evaluator, tracer, varied)
@@ -182,7 +191,7 @@ def write_program(
         places, modes = mode_states(evaluator, state)
         y[places] = modes
         t_now = Symbol(tracer, tracer.at(t.Value(t.FLOAT, ("%t",)), time))
-        out = results(evaluator, k, t_now, y, outcome, system.struct)
+        out = results(evaluator, k, t_now, y, outcome, system.struct, is_behind)
         stores: list[tuple[Callable[[], str], int, Any]] = [
             *((lambda: "%out", place, x) for place, x in enumerate(out)),
             *((lambda: "%y", place, x) for place, x in enumerate(y if k == PROJECT else ())),
@@ -291,7 +300,7 @@ def write_programs(
 
     Args:
         evaluator: of the scene, as a run begins.
-        name: of the programs; reports are among them where it ends in ``REPORTS``.
+        name: of the programs; reports are among them where it ends in ``REPORTS``; ``ALONE``.
         time, state: where branches are decided.
         varied: as of ``constants``.
         others: of projections, as of ``merged`` (ways.py), unless that were too long.
@@ -303,24 +312,25 @@ def write_programs(
     entries = evaluator.functions.entries
     found, general = [*programmed(evaluator), *([REPORT] * name.endswith(REPORTS))], {}
     texts, needs, written = list[str](), dict[str, str](), list[int]()
+    first = float(ALONE not in name)
     for k in found:
         general[k] = _named(entries[k])
         head = _rates_head(evaluator, general[k]) if k == RHS else _HEAD
         own = zip(("name", "counter"), symbols_of(name, k), strict=True)
         names = dict(own, general=general[k])
         if k == PROJECT:
-            given = {"project": general[PROJECT], "arguments": ARGUMENTS}
-            head = _PROJECTION_HEAD.format(**given)
             names["general"] = behind = symbols_of(name, BEHIND)[0]
+            head = _PROJECTION_HEAD.format(first=1.0, project=general[k], arguments=ARGUMENTS)
             texts.append(_BEHIND.format(name=behind, head=head, rhs=general[RHS], size=state.size,
-                                        **given))  # fmt: skip
+                                        project=general[k], arguments=ARGUMENTS))  # fmt: skip
+            head = _PROJECTION_HEAD.format(first=first, project=behind, arguments=ARGUMENTS)
             written.append(BEHIND)
             if count > 1:
                 continue
         of = evaluator, k, time, state, names, head, varied, None
         for ways in (None,) if others is None or k != PROJECT else (others, None):
             try:
-                text, needed = write_program(*of, ways, count)
+                text, needed = write_program(*of, ways, count, first == 1.0)
             except TraceError:
                 if k == RHS:
                     raise

@@ -24,6 +24,7 @@ from dap3d_core.integrators.stepping.event_location import (
 )
 from dap3d_core.integrators.stepping.integration_state import (
     ABSOLUTE,
+    FOUND,
     MOST,
     MOST_COUNTED,
     NOISE,
@@ -51,6 +52,7 @@ from dap3d_core.integrators.stepping.step_control import (
     turns_are_certain,
     work_error,
 )
+from dap3d_core.integrators.stepping.switch_values import evaluate
 from dap3d_core.integrators.stepping.vector_ops import all_finite, scaled_beyond, scaled_largest
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.array_struct import Matrix, Scalar
@@ -377,6 +379,8 @@ def complete_step(
     trial, total, watched = work.state[TRIAL], work.state[SCRATCH], work.switch_count != 0
     for i in range(trial.size):
         total[i] = rates[i] - total[i]  # the sum of Phi*_j again
+    if watched:  # before f, as of runge_kutta/step.py
+        evaluate(work, t1, trial, FOUND, watch, system, loops)
     if watched or t1 < work.times[-1] or work.times[work.next_report] < t1:
         work.rhs_count += 1
         rhs(t1, trial, rates, system, loops)

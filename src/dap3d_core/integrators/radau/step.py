@@ -28,6 +28,7 @@ from dap3d_core.integrators.stepping.event_location import (
 )
 from dap3d_core.integrators.stepping.integration_state import (
     ABSOLUTE,
+    FOUND,
     NOT_FINITE,
     RUNNING,
     SCRATCH,
@@ -51,6 +52,7 @@ from dap3d_core.integrators.stepping.step_control import (
     reject,
     step_floor,
 )
+from dap3d_core.integrators.stepping.switch_values import evaluate
 from dap3d_core.integrators.stepping.vector_ops import all_finite
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -289,8 +291,10 @@ def complete_step(
     slope = work.state[TRIAL_SLOPE]
     if not all_finite(slope):
         return NOT_FINITE
-    if work.switch_count != 0 and end_is_across(work, t1, slope, watch, system, loops):
-        return STEP_CUT
+    if work.switch_count != 0:
+        evaluate(work, t1, work.state[TRIAL], FOUND, watch, system, loops)
+        if end_is_across(work, t1, slope, watch, system, loops):
+            return STEP_CUT
     if needs_dense(work, t1):
         prepare_dense(h, work)
     return RUNNING

@@ -39,6 +39,7 @@ from dap3d_core.integrators.stepping.event_location import (
     update_switches_after_step,
 )
 from dap3d_core.integrators.stepping.integration_state import (
+    FOUND,
     GIVEN,
     NOT_FINITE,
     OTHER,
@@ -79,6 +80,7 @@ from dap3d_core.integrators.stepping.step_control import (
     step_floor,
     step_reduction,
 )
+from dap3d_core.integrators.stepping.switch_values import evaluate
 from dap3d_core.integrators.stepping.vector_ops import all_finite, copy, scaled_largest
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
@@ -417,6 +419,8 @@ def complete_step(
         return failure
     if known and work.projection_moved != 0.0:
         known = controlled and is_within_error(work)
+    if watched:  # before f, which is known where multipliers have been found for switches
+        evaluate(work, t1, trial, FOUND, watch, system, loops)
     if not known and (watched or t1 < times[-1]):
         work.rhs_count += 1
         rhs(t1, trial, k[result], system, loops)

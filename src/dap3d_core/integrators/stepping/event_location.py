@@ -204,10 +204,9 @@ def end_is_across(
 ) -> bool:
     """True if the trial state, with dy/dt ``slope``, lies across, or the motion went there.
 
-    Then the step is cut.
+    Then the step is cut. Its switches stand in row FOUND.
     """
     s, trial, h = work.switches, work.state[TRIAL], t1 - work.t
-    evaluate(work, t1, trial, FOUND, watch, system, loops)
     if changes_sign(s, FOUND):
         cut_step(work, FOUND, h)
         return True

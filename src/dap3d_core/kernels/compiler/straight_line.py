@@ -226,10 +226,13 @@ def _unsigned(kind: type, value: t.Value) -> tuple[t.Value, bool]:
 
 
 def _folded(kind: type, a: t.Value, b: t.Value) -> t.Value | None:
-    """The result where one operand is zero or one; NEGATIVE: -b; None: it is none of these."""
+    """The result where one operand is zero, one or a truth; NEGATIVE: -b; None: it is none."""
     if (a.constant is None) == (b.constant is None):
         same = kind is ast.Sub and a.constant is None and a.words == b.words
         return t.constant(0.0) if same else None
+    if (kind is ast.BitAnd or kind is ast.BitOr) and a.type == b.type == t.BOOL:
+        known, other = (b, a) if a.constant is None else (a, b)
+        return other if bool(known.constant) == (kind is ast.BitAnd) else known
     if kind is ast.Add:
         return b if a.constant in _ZERO else a if b.constant in _ZERO else None
     if kind is ast.Sub:

@@ -58,6 +58,18 @@ def test_bits_are_those_of_general_code(model, method, at_once):
     assert set(found) - {REPORT} in ({RHS}, {RHS, PROJECT, scene_program.BEHIND})
 
 
+@pytest.mark.parametrize("method", ["standard", "lsq"])
+def test_steps_of_a_fixed_length_project_by_a_program_alone(method, at_once):
+    """They project what they end at before they evaluate it."""
+    settings = {"method": method, "integrator": "rk4", "step": 1e-3}
+    for _ in range(2):
+        assert_same(dap.simulate("pen1", **SETTINGS, **settings), general("pen1", **settings))
+    (name,) = at_once
+    assert name.endswith(scene_program.ALONE)
+    assert programs(at_once)[PROJECT].address != programs(at_once)[scene_program.BEHIND].address
+    assert programs(at_once)[PROJECT].failures() < 3
+
+
 @pytest.mark.every(2)
 @pytest.mark.parametrize(("model", "method"), [("pen1", "joint"), ("fourbar3", "standard"),
                          ("bodies2", "unconstrained")])  # fmt: skip

@@ -66,6 +66,20 @@ def test_zeros_and_ones_fold_and_equal_expressions_are_one():
     assert traced(lambda a, b, c, d: (a * 0.0, 3.0 - 3.0))[1] == (0.0, 0.0)
 
 
+def test_truths_that_are_known_fold():
+    """What a mode rules out leaves nothing of a condition."""
+    given = lambda a, b, c, d: (  # noqa: E731
+        where((a > 2.0 * a) & (a != a) & False, b, 1.0),
+        where((a < b) | True, 2.0, c),
+        where((a < b) & True, a, b),
+        where(False | (a < b), a, b),
+    )
+    tracer, (never, always, one, other) = traced(given)
+    assert (never, always) == (1.0, 2.0)
+    assert one.value == other.value
+    assert tracer.taken_lines().count("select") == 1
+
+
 def signed_products(a, b, c, d):
     """Two products in words, one in numbers."""
     return a * b - (-b) * a, (-a) * b + c, 0.0 - (0.0 - a), a - a
