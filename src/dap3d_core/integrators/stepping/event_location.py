@@ -94,7 +94,7 @@ def next_length(
     slope: dy/dt at the state.
     """
     longest = min(end, work.step_limit) - work.t
-    h = longest
+    h = min(longest, with_slopes(work.step_limit_at_switch, 0.0))
     short = max(EULER_STEP_FRACTION * usual_step(work), 4.0 * FLOOR * time_span(work))
     short = with_slopes(short, 0.0)  # as all lengths that are chosen
     if work.switch_count != 0:
@@ -103,7 +103,6 @@ def next_length(
             if work.end_status != 0:
                 return 0.0
         h = min(h, with_slopes(distance_to_crossing(work, h, short), 0.0))
-    h = min(h, with_slopes(work.step_limit_at_switch, 0.0))
     short *= 2.0 ** min(work.stalled_steps, MAX_STALLS)
     if h > short or h == end - work.t:
         return h
