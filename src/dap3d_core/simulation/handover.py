@@ -32,6 +32,9 @@ BEHIND = 3.0
 HIGHEST = 6.0
 #: Part of the run in which slip that has begun becomes fast enough for explicit steps.
 SLIPPING = 1e-4
+#: The first step there, by the explicit ones: at first slip changes by as much as it is within few
+#: of them, and the iteration for the stages converges where it changes by some times as much.
+FIRST = 30.0
 SLOW_SLIP = information(
     "explicit steps became too short, as slip asks for that begins with next to no acceleration: "
     f"{IMPLICIT.name} took the run on until it was faster"
@@ -67,6 +70,8 @@ def hand_over(run: RunState) -> bool:
         run.observe_present()
     if left < np.inf:
         _aim_across(run, left)
+    elif slips and run.present.implicit:
+        run.present.work.h = FIRST * present.work.h
     return True
 
 

@@ -3,7 +3,8 @@
 What joints hold is out of the coordinates, and rows that are kept on a tree are eliminated in f, as
 in any integration by method joint. The tangent is that of the whole right-hand side, one column for
 each component, by differences: its differentiated form, in lanes, would be code that neither plain
-Python nor an exported model has. It only has to let the iteration converge.
+Python nor an exported model has. It only has to let the iteration converge. Modes of contacts and
+what goes with them are constant, and have no columns where they are the last states.
 """
 
 import math
@@ -64,7 +65,7 @@ class RateTangent(Arrays):
     columns: IntegerMatrix
     updates: IntegerMatrix
     bends: Floats  # (1,) as of ``Tangent``
-    J: Matrix  # (N, N) of all components but the work
+    J: Matrix  # (N, N) of the components that change, without the work
 
 
 @compiled
@@ -87,7 +88,7 @@ def find_rate_tangent(work: RadauState, given: Given) -> None:
     n, jump = J.shape[0], 0.0
     for i in range(n):
         jump = max(jump, JUMP * abs(f[i]))
-    finite = abs(f[n]) < math.inf
+    finite = abs(f[f.shape[0] - 1]) < math.inf
     work.rhs_count += 1
     for j in range(n):
         now, is_rate = y[j], j >= work.counts[0]
@@ -103,7 +104,7 @@ def find_rate_tangent(work: RadauState, given: Given) -> None:
                 far = slopes(at, j, COARSER * h, y, f, changed, work, system, loops, functions)
                 slope = slopes(at, j, h, y, f, changed, work, system, loops, functions)
                 slope = -1.0 if slope > JUMPS * far else slope
-            finite = finite and abs(changed[n]) < math.inf  # no power where forces jam
+            finite = finite and abs(changed[f.shape[0] - 1]) < math.inf  # no power: forces jam
             first = slope if steepest < 0.0 else first
             if (slope >= 0.0 and slope > STEEPER * steepest) or not slope < math.inf:
                 steepest = slope
@@ -304,14 +305,26 @@ class JointRadauIntegration(RadauIntegration):
         """As of ``RadauIntegration``."""
         coordinates: Any = self.evaluator.coordinates
         layout, size = coordinates.nodes.layout, coordinates.size
-        self.lu_plan = make_lu_plan(0, (), (), [StateNode(size, ())])
+        rates, states = layout["angle_rates"].start, layout["states"].start
+        count = states + self._changing_states(size - states)
+        self.lu_plan = make_lu_plan(0, (), (), [StateNode(count, ())])
         lu = self.lu_plan
         self.tangent = RateTangent(
             nodes=lu.nodes, columns=lu.columns, updates=lu.updates, bends=np.zeros(1),
-            J=np.zeros((size, size)),
+            J=np.zeros((count, count)),
         )  # fmt: skip
-        rates, states = layout["angle_rates"].start, layout["states"].start
         return 0, 1, (rates, states - rates, size - states)
+
+    def _changing_states(self, count: int) -> int:
+        """Of the states of elements, ``count`` of them, how many come before contacts alone do."""
+        contacts = self.evaluator.system.contacts
+        if not len(contacts):
+            return count
+        from dap3d_core.formulations.contacts.equations import STATE
+        from dap3d_core.formulations.contacts.rows import OF_CONTACT
+
+        of_contacts = np.add.outer(contacts[:, STATE], np.arange(OF_CONTACT))
+        return int(np.max(np.setdiff1d(np.arange(count), of_contacts), initial=-1)) + 1
 
     @property
     def loop_arguments(self) -> tuple[Any, ...]:

@@ -94,7 +94,7 @@ def next_length(
     slope: dy/dt at the state.
     """
     longest = min(end, work.step_limit) - work.t
-    h = longest
+    h = min(longest, with_slopes(work.step_limit_at_switch, 0.0))
     short = max(EULER_STEP_FRACTION * usual_step(work), 4.0 * FLOOR * time_span(work))
     short = with_slopes(short, 0.0)  # as all lengths that are chosen
     if work.switch_count != 0:
@@ -103,7 +103,6 @@ def next_length(
             if work.end_status != 0:
                 return 0.0
         h = min(h, with_slopes(distance_to_crossing(work, h, short), 0.0))
-    h = min(h, with_slopes(work.step_limit_at_switch, 0.0))
     short *= 2.0 ** min(work.stalled_steps, MAX_STALLS)
     if h > short or h == end - work.t:
         return h
@@ -233,7 +232,7 @@ def cubic_minimum(a: float, b: float, c: float, d: float) -> float:
     """Abscissa in (0, 1) of the minimum of the cubic with values a, c, slopes b, d at 0, 1.
 
     1 where there is none, or where it is clear of zero: by more than a cubic errs, which is a part
-    of the drop to it from the nearer end.
+    of the drop to it from the nearer end; all of the drop from a maximum, where it rises before.
     """
     if not d > 0.0:
         return 1.0
@@ -247,8 +246,11 @@ def cubic_minimum(a: float, b: float, c: float, d: float) -> float:
         x = -b / (p2 + root)
     if inside < 0.0 or not 0.0 < x < 1.0:
         return 1.0
-    low = a + x * (b + x * (p2 + x * p3))
-    return 1.0 if low >= CUBIC_ERROR * (min(a, c) - low) else x
+    low, high, error = a + x * (b + x * (p2 + x * p3)), a, CUBIC_ERROR
+    if b > 0.0:  # then p2 < 0 < p3
+        top = -(p2 + root) / (3.0 * p3)
+        high, error = a + top * (b + top * (p2 + top * p3)), 1.0
+    return 1.0 if low >= error * (min(high, c) - low) else x
 
 
 @compiled

@@ -30,7 +30,7 @@ FAILED, NEAR_SINGULAR = 1.0, 2.0
 #: many right-hand sides, times components, about a second, it ends.
 STALLED_STEP, ATTEMPTS, STALL_WORK = 1e-9, 1000, 10_000_000
 #: The same part where another integration may go on with slow slip; so many attempts are enough.
-SLOW_STEP = 1e-8
+SLOW_STEP = 1e-7
 
 
 @compiled
