@@ -138,6 +138,7 @@ SETTING_MISTAKES = [
     ('name = "base"', 'title = "base"', "scene.title", ["unknown key"]),
     ("[vectors.axis]", "[vector.b]\nx = 1\n[vectors.axis]", "vector", ["'vectors'?"]),
     ("[vectors.axis]", "[Bodies.b]\nx = 1\n[vectors.axis]", "Bodies", ["'bodies'?"]),
+    ("[vectors.axis]", "[gravity]\nz = -9.81\n[vectors.axis]", "gravity", ["a force", "weight"]),
     ("t_end = 2.0", "t_end = -1.0", "simulation.t_end", ["at least 0"]),
     ("t_end = 2.0", "t_end = nan", "simulation.t_end", ["finite number, not nan"]),
     ("t_end = 2.0", "t_end = inf", "simulation.t_end", ["finite number, not inf"]),

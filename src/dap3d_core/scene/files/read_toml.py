@@ -26,6 +26,14 @@ from dap3d_core.scene.tables import (
     Simulation,
 )
 
+#: Where a scene has what other programs write at the top.
+WHERE_ELSE = {
+    "gravity": 'it is a force: [forces.gravity] with type = "weight"',
+    "drivers": 'they are joints: [joints.NAME] with type = "rel-rot" or another',
+    "springs": 'they are forces: [forces.NAME] with type = "ptp"',
+    "t_end": "write it under [simulation]",
+    "dt": "write it under [simulation]",
+}
 #: Keys of a table [include.NAME].
 INCLUDE_KEYS = frozenset({"file", "at", "parameters"})
 #: Larger files are refused before they are read.
@@ -121,7 +129,9 @@ def scene_of(
         if name not in TABLES:
             value = MISSING if isinstance(content, (dict, list)) else plain(content)
             what = f"unknown table; a scene has {', '.join(TABLES)}"
-            mistakes.add((name,), value, what, mistakes.nearest(name, TABLES))
+            remedy = WHERE_ELSE.get(name, "")
+            nearest = "" if remedy else mistakes.nearest(name, TABLES)
+            mistakes.add((name,), value, what, nearest, remedy)
     scene = Scene(faults=mistakes.mistakes, path=path)
     header = _known(mistakes, ("scene",), data.get("scene", {}), HEADER_KEYS)
     scene.name = header.get("name", "")
