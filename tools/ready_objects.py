@@ -41,14 +41,16 @@ def main(arguments: list[str]) -> None:
         units, linked = _gathered_alone(Path(scratch))
     _add_sources()
     from dap3d_core.kernels.runtime.ready import TARGETS
+    from dap3d_core.native.build import PLATFORMS
 
     Path(folder).mkdir(parents=True, exist_ok=True)
     with concurrent.futures.ProcessPoolExecutor(initializer=_add_sources) as pool:
-        done = {name: pool.submit(pack_of, name, units, linked) for name in names or TARGETS}
+        given = {name: linked if name in PLATFORMS else {} for name in names or TARGETS}
+        done = {name: pool.submit(pack_of, name, units, more) for name, more in given.items()}
         for name, found in done.items():
             content, count = found.result()
             (Path(folder) / f"{name}.pack").write_bytes(content)
-            total = len(units) + len(linked)
+            total = len(units) + len(given[name])
             print(f"{name}: {count} of {total} units, {len(content) / 1e3:.0f} kB")
 
 
@@ -60,9 +62,10 @@ def pack_of(
     Args:
         target_name: a key of ``ready.TARGETS``.
         units: text and results of each unit, by its name.
-        linked: text and level of units for linkers; they go where the target is a platform.
+        linked: text and level of units for the linker of a platform of that name.
 
-    A unit with an external symbol that not every such system has is left out.
+    A unit with an external symbol that not every such system has is left out, unless a linker that
+    has it follows.
     """
     import llvmlite.binding as llvm
     from object_symbols import symbols_of
@@ -75,16 +78,14 @@ def pack_of(
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     level = int(os.environ.get(LEVEL, OPTIMISED))
-    codes = {
-        name: (results, compile_ir(text, level, TARGETS[target_name]))
-        for name, (text, results) in units.items()
-    }
-    if target_name in PLATFORMS:
+    kept = {}
+    for name, (text, results) in units.items():
+        code = compile_ir(text, level, TARGETS[target_name])
+        if symbols_of(code).undefined <= SYSTEM | {*EXACT, *LIBRARY}:
+            kept[name] = results, code
+    for name, (text, own) in (linked or {}).items():
         processor = PLATFORMS[target_name].processor
-        for name, (text, own) in (linked or {}).items():
-            codes[name] = [], compile_ir(text, min(own, level), processor, is_linked=True)
-    allowed = SYSTEM | {*EXACT, *LIBRARY}
-    kept = {name: unit for name, unit in codes.items() if symbols_of(unit[1]).undefined <= allowed}
+        kept[name] = [], compile_ir(text, min(own, level), processor, is_linked=True)
     return packed(kept), len(kept)
 
 
