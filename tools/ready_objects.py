@@ -3,8 +3,8 @@
 ``python tools/ready_objects.py FOLDER [TARGET ...]`` writes a file for each target. It compiles the
 source tree that contains it, installed or not; it needs attrs, llvmlite, numpy, pluggy and scipy.
 The loops are those of all standard types; the core's units are those that runs of the shipped
-models make, with each method and integrator, and that their exports link. Where DAP3D_READY_LEVEL is 0, for tests, code is
-unoptimised and of three models alone: more than a minute less.
+models make, with each method and integrator, and that their exports link. Where DAP3D_READY_LEVEL
+is 0, for tests, code is unoptimised and of three models alone: more than a minute less.
 """
 
 import concurrent.futures

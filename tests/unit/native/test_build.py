@@ -17,7 +17,7 @@ from dap3d_core.native.beside import compile_modules
 from dap3d_core.native.export import model_of
 
 sys.path.append(str(REPOSITORY / "tools"))
-from ready_objects import pack_of  # noqa: E402
+from ready_objects import pack_of
 
 THREADS = """
 #include <pthread.h>
