@@ -204,23 +204,6 @@ def test_what_a_models_file_changes_is_put_back_or_told(model):
         assert words in notes
 
 
-@pytest.mark.parametrize(
-    ("line", "words"),
-    [
-        ("raise GeneratorExit", "GeneratorExit"),
-        ("def f(:", "SyntaxError"),
-        ("x = [0] * 10**15", "MemoryError"),
-        ("def f(): return f()\nf()", "RecursionError"),
-        ("\0", "null bytes|SyntaxError|ValueError"),
-    ],
-)
-def test_a_models_file_that_fails_at_import_is_named(model, line, words):
-    folder = model(at_import=line)
-    with pytest.raises(dap.SceneError, match=words) as caught:
-        compiled(folder)
-    assert "plugin.py" in str(caught.value)
-
-
 def test_ctrl_c_while_a_models_file_is_loaded_names_it(model, capsys):
     """A file that never ends loading is then known."""
     folder = model(at_import="raise KeyboardInterrupt")
@@ -261,17 +244,6 @@ def _run(folder, **variables):
         text=True,
         timeout=300,
     )
-
-
-def test_two_types_of_a_models_file_with_one_keyword_are_refused(model):
-    folder = model()
-    text = (folder / "plugin.py").read_text()
-    again = "class Again(Mine):\n    pass\n\n\n@hookimpl"
-    (folder / "plugin.py").write_text(
-        text.replace("@hookimpl", again).replace("[Mine]", "[Mine, Again]")
-    )
-    with pytest.raises(dap.SceneError, match="mine"):
-        compiled(folder)
 
 
 #: Classes of a model's own file that have the keyword of an installed force.

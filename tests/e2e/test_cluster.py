@@ -127,14 +127,6 @@ def test_nothing_is_left_on_the_cluster(client):
     wait_until(lambda: not client.who_has())
 
 
-def test_ctrl_c_cancels_the_tasks(client):
-    found = dask_cluster.run_on(client, bob(), POINTS, np.arange(200), chunk=1)
-    next(found)
-    with pytest.raises(KeyboardInterrupt):
-        found.throw(KeyboardInterrupt)
-    wait_until(lambda: not any(client.processing().values()))
-
-
 def test_functions_of_the_script_are_sent(client, tmp_path, monkeypatch):
     """By value; one of a module that workers have not is named, with what to do."""
     asked = {"lowest": "bob.r.z:min", "fastest": lambda result: abs(result.w).max()}
@@ -163,50 +155,6 @@ def test_a_point_that_fails_is_no_task_that_fails(client):
     assert "mass" in found[2][1]
 
 
-STUMBLING = """
-import tempfile
-from pathlib import Path
-
-
-class Stumbling:
-    def __init__(self, folder):
-        self.folder = folder
-
-    def __setstate__(self, state):
-        self.__dict__ |= state
-        count = len(list(Path(self.folder).iterdir()))
-        tempfile.mkstemp(dir=self.folder)
-        if count == 2:  # both workers have been asked whether they can load it
-            raise ConnectionError("for once")
-
-    def __call__(self, result):
-        return result.r[:, 0, 2].min()
-"""
-
-
-def test_a_task_that_raises_is_tried_again(tmp_path, monkeypatch, alone):
-    """An output that cannot be unpickled once, as on a disk that is not there for a moment."""
-    (tmp_path / "stumbling.py").write_text(STUMBLING)
-    monkeypatch.setenv("PYTHONPATH", path(tmp_path))
-    monkeypatch.syspath_prepend(str(tmp_path))
-    stumbling = importlib.import_module("stumbling").Stumbling
-    with two_workers() as client:
-        for retries in (0, 1):
-            marks = tmp_path / str(retries)
-            marks.mkdir()
-            study = bob({"lowest": stumbling(str(marks))})
-            found = dask_cluster.run_on(
-                client, study, POINTS, PLACES[:20], chunk=10, retries=retries
-            )
-            if not retries:
-                with pytest.raises(ConnectionError, match="for once"):
-                    collected(found)
-                continue
-            lowest = {k: values["lowest"] for k, (_, _, values) in collected(found).items()}
-            assert lowest == {k: alone[k][2]["bob.r.z:min"] for k in range(20)}
-            assert len(list(marks.iterdir())) > 3
-
-
 def test_a_worker_that_is_killed_loses_nothing(alone):
     """By SIGKILL, in the middle; what it had is done by the others, and nothing comes twice."""
     with two_workers() as client:
@@ -225,40 +173,6 @@ def test_a_worker_that_is_lost_while_it_reports_its_versions_has_no_say(client, 
         os.kill(pid, signal.SIGSTOP)
         threading.Timer(1.0, os.kill, (pid, signal.SIGKILL)).start()
         same(alone, collected(dask_cluster.run_on(client, bob(), POINTS, PLACES)))
-
-
-class _Losing:
-    """A client all of whose workers are lost at the first questions."""
-
-    status = "running"
-
-    def __init__(self, *answers):
-        self.answers, self.asked = list(answers), 0
-
-    def wait_for_workers(self, count, timeout):
-        if not self.answers:
-            raise TimeoutError
-        self.asked += 1
-
-    def run(self, *question, on_error):
-        self.found = self.answers.pop(0)
-        return self.found
-
-    def nthreads(self):
-        return {worker: 1 for worker, answer in self.found.items() if answer == "fit"}
-
-    scheduler = None
-
-
-def test_where_all_workers_are_lost_others_are_waited_for():
-    from distributed import comm
-
-    gone, lost = {"a": comm.CommClosedError("removed")}, {"b": OSError("reset")}
-    losing = _Losing(gone, lost, {"b": OSError("reset"), "c": "fit"})
-    assert dask_cluster._answers(losing, b"") == {"c": "fit"}
-    assert losing.asked == 3
-    with pytest.raises(dask_cluster.ClusterError, match="has no workers"):
-        dask_cluster._answers(_Losing(gone, lost), b"")
 
 
 def test_points_that_kill_their_workers_are_named():

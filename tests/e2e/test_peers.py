@@ -41,18 +41,6 @@ def test_the_driver_of_dap3d_reaches_all_levels(tmp_path):
     assert all(s > 0.0 for c in cells for s in c["seconds"])
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(
-    importlib.util.find_spec("exudyn") is not None, reason="Exudyn is installed here"
-)
-def test_a_program_that_is_not_there_is_skipped(tmp_path):
-    command = [sys.executable, str(PEERS / "run.py"), "-o", str(tmp_path / "out.json"),
-               "--programs", "exudyn", "--scenes", "free-body-1", "--passes", "1"]  # fmt: skip
-    done = subprocess.run(command, env=environment(), capture_output=True, text=True, timeout=100)
-    assert done.returncode == 0, done.stderr
-    assert "exudyn was skipped: No module named 'exudyn'" in done.stdout
-
-
 def test_references_are_of_these_scenes(beside):
     """Every scene has one, as many positions as bodies, known far below the finest level."""
     references, scenes = beside("references").load(), list(beside("mechanisms").all_mechanisms())
@@ -62,16 +50,6 @@ def test_references_are_of_these_scenes(beside):
         numbers = 9 if mechanism.name == "free-body" else 3 * len(mechanism.bodies)
         assert len(reference["R" if mechanism.name == "free-body" else "x"]) == numbers
         assert reference["uncertainty"] < 5e-10
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("key", ["heavy-top-1", "spherical-chain-4", "ball-1", "four-bars-2"])
-def test_references_are_found_again(beside, key):
-    """Made anew at a looser tolerance they agree with what is stored."""
-    makers, scenes = beside("references"), beside("mechanisms")
-    mechanism = scenes.mechanism_of(key)
-    found = makers.MAKERS[mechanism.name](mechanism, 1e-10)
-    assert scenes.error_of(mechanism, makers.load()[key], found["x"], None) < 1e-6
 
 
 def test_times_are_interpolated_between_settings(beside):

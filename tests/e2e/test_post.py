@@ -10,9 +10,6 @@ import xarray
 
 import dap3d_core as dap
 
-ARRAYS = ("r", "p", "rd", "w", "wp", "rdd", "wd", "wpd", "rP", "rPd", "rPdd", "Lam")
-PARTS = ("force", "moment", "force_body", "moment_body", "moment_at_point")
-
 
 @pytest.fixture(scope="module")
 def run_files(tmp_path_factory):
@@ -68,40 +65,6 @@ def test_a_table_reads_back_bit_for_bit(dap3d, result):
 
 
 @pytest.mark.slow
-def test_a_table_of_picked_quantities(dap3d, result):
-    dap3d.succeed("post", "pen1.nc", "-o", "some.csv", "--select", "cone.r", "J1.force.norm")
-    column = table_of(dap3d.folder / "some.csv")
-    assert list(column) == [
-        "t [s]", "cone.r.x [m]", "cone.r.y [m]", "cone.r.z [m]", "J1.force.norm [N]",
-    ]  # fmt: skip
-    assert column["J1.force.norm [N]"].tolist() == result.quantity("J1.force.norm").values.tolist()
-    dap3d.succeed("post", "pen1.nc", "-o", "more.csv", "--select", "t", "--select", "energy.total")
-    assert list(table_of(dap3d.folder / "more.csv")) == ["t [s]", "energy.total [J]"]
-
-
-@pytest.mark.slow
-def test_a_file_with_named_dimensions(dap3d, result):
-    assert dap3d("post", "pen1.nc", "-o", "all.nc", "--jacobian").returncode == 0
-    with xarray.open_dataset(dap3d.folder / "all.nc") as data:
-        for name in (*ARRAYS, "Jac"):
-            assert data[name].values.tolist() == getattr(result, name).tolist()
-        for name in data.variables:
-            assert "units" in data[name].attrs, name
-        assert data["r"].dims == ("time", "body", "axis")
-        assert data["rP"].dims == ("time", "point", "axis")
-        assert data["Jac"].dims == ("time", "row", "velocity")
-        assert data["rdd"].sel(body="cone", axis="z").dims == ("time",)
-        on = result.reaction("J1")
-        for part in PARTS:
-            for slot, body in (("i", "cone"), ("j", "ground")):
-                found = data[f"reaction_{part}"].sel(reaction=f"J1.{slot}")
-                assert found.values.tolist() == getattr(on[slot], part).tolist()
-                assert str(found["reaction_body"].values) == body
-        assert data["total_energy"].values.tolist() == result.energy.total.tolist()
-    assert dap3d("info", "all.nc").returncode == 2  # it is no result
-
-
-@pytest.mark.slow
 def test_what_was_written_as_json(dap3d, result):
     done = dap3d("post", "pen1.nc", "--json")
     found = json.loads(done.stdout)
@@ -118,19 +81,6 @@ def test_what_was_written_as_json(dap3d, result):
     assert columns["file"] == "pen1-post.csv"
     headings = [f"{a['name']} [{a['unit']}]" for a in columns["arrays"]]
     assert headings == list(table_of(dap3d.folder / "pen1-post.csv"))
-
-
-@pytest.mark.slow
-def test_a_scene_without_joints_has_no_rows_and_its_springs_have_quantities(dap3d, result):
-    dap3d.succeed("post", "bodies2.nc", "--jac", "-o", "b.nc")
-    with xarray.open_dataset(dap3d.folder / "b.nc") as data:
-        assert {"r", "rPdd", "total_energy"} <= set(data.data_vars)
-        assert not {"Lam", "Jac", "reaction_force"} & set(data.data_vars)
-    picked = ("spring1.length", "spring1.tension", "spring2.i.moment_body.x")
-    assert dap3d("post", "bodies2.nc", "-o", "s.csv", *picked).returncode == 0
-    column = table_of(dap3d.folder / "s.csv")
-    assert column["spring1.length [m]"][0] == 1.5  # unstretched at the start
-    assert column["spring1.tension [N]"][0] == 0.0
 
 
 @pytest.mark.slow

@@ -1,7 +1,6 @@
 """``dap3d sweep`` as a user has it: what is told, how it ends, what a kill leaves of it."""
 
 import json
-import resource
 import shlex
 import signal
 import time
@@ -168,35 +167,3 @@ def test_a_signal_keeps_the_points(dap3d, whole):
     assert command == ["dap3d", *LONG, "--resume"]
     dap3d.succeed(*command[1:])
     assert dap.open_sweep(dap3d.folder / "a.nc").identical(whole)
-
-
-@pytest.mark.slow
-def test_a_full_disk_ends_a_sweep_in_a_sentence(dap3d, scene_file, monkeypatch):
-    """A file may not grow beyond its first places: nothing is left that is half a file."""
-    scene_file()
-    dap3d(*FALL, "-o", "warm.nc")  # compiled code must find room: it is in its cache now
-    (dap3d.folder / "warm.nc").unlink()
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (9_000, before[1]))
-    try:
-        # bytecode would be cut off, and kept
-        process = dap3d.start(*FALL, "--json", PYTHONDONTWRITEBYTECODE=1)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    out, err = process.communicate(timeout=300)
-    assert process.returncode in (1, 2), err
-    assert "Traceback" not in err
-    assert "cannot write" in json.loads(out)["error"]
-    assert [file.name for file in dap3d.folder.iterdir()] == ["fall.toml"]
-
-
-@pytest.mark.slow
-def test_of_two_sweeps_of_one_file_one_is_refused(dap3d):
-    first = dap3d.start(*LONG, **SLOW)
-    _wait_for(first, dap3d.folder / "a.nc.part", 1)
-    second = dap3d(*LONG)
-    assert second.returncode == 2
-    assert "another sweep is writing it now" in second.stderr
-    first.kill()
-    first.communicate()
-    assert dap.open_sweep(dap3d.folder / "a.nc.part")["status"].values[0] == 1

@@ -4,7 +4,6 @@ import shutil
 
 import pytest
 from support.matlab import SMALL, write
-from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.scene import MISSING
@@ -194,20 +193,3 @@ def test_arithmetic_that_overflows_is_refused(refused, words):
     """numpy's warning of it is no message to a user."""
     (found,) = refused(**changed("inBodies", "B1.mass = 2", f"B1.mass = {words}"))
     assert "not a finite real number" in found
-
-
-@pytest.mark.every(2)
-@long_in_plain_python
-@pytest.mark.parametrize(
-    ("begin", "again"),
-    [
-        ("x = ones(100, 100);\n", "x = x * x * 1e-2;\n" * 400),
-        ("B = Body_struct; x = [B];\n" + "x = [x; x];\n" * 13, "x = x;\n" * 400),
-    ],
-    ids=["matrices", "structures"],
-)
-def test_work_without_end_is_refused(refused, begin, again):
-    """A file of allowed size, each statement of which is allowed, took some minutes."""
-    found = refused(inBodies=SMALL["inBodies.m"] + begin + again)
-    limits = ("more than 3000000 entries", "an array of 1000000 entries is no part of a model")
-    assert any(limit in found[0] for limit in limits)

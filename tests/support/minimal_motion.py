@@ -35,14 +35,6 @@ def rod_axes(d, u):
     return np.stack([d, cross(z, d), z], axis=1)
 
 
-def meeting(a, ra, b, rb, normal):
-    """The point at ra from a and rb from b in a plane; on the left of a -> b, seen along normal."""
-    d = np.sqrt((b - a) @ (b - a))
-    e = (b - a) / d
-    along = (ra**2 - rb**2 + d**2) / (2.0 * d)
-    return a + along * e + np.sqrt(ra**2 - along**2) * cross(normal, e)
-
-
 @attrs.frozen
 class Body:
     """A rigid body: mass, principal moments in its axes about its mass centre, and this."""

@@ -1,4 +1,4 @@
-"""Mechanisms as files of URDF, SDF and MJCF, written from places in global axes.
+"""Mechanisms as files of SDF and MJCF, written from places in global axes.
 A writer of its own, for tests of what reads such files."""
 
 import attrs
@@ -90,35 +90,3 @@ def mjcf(bodies, poses, joints):
             anchor = _words(axes.T @ (np.array(joint.at) - here))
             lines.append(f'<connect name="{name}" {ends} anchor="{anchor}"/>')
     return "\n".join([*lines, "</equality></mujoco>"])
-
-
-def urdf(bodies, poses, joints):
-    """The text of a URDF file of hinges; loops are <constraint>."""
-    lines, at = ['<robot name="m"><link name="world"/>'], {"world": (np.zeros(3), np.eye(3))}
-    for joint in joints.values():
-        if not joint.closes:
-            at[joint.child] = (np.array(joint.at), poses[joint.child][1])
-    for name, body in bodies.items():
-        (origin, A), (o, _) = at[name], poses[name]
-        com = A.T @ (o + A @ body.com - origin)
-        moments = zip(("ixx", "iyy", "izz"), body.J, strict=True)
-        words = " ".join(f'{key}="{value!r}"' for key, value in moments)
-        lines.append(f'<link name="{name}"><inertial><origin xyz="{_words(com)}"/>')
-        lines.append(f'<mass value="{body.mass}"/><inertia {words} ixy="0" ixz="0" iyz="0"/>')
-        lines.append("</inertial></link>")
-    for name, joint in joints.items():
-        (o, A), tag = at[joint.parent], "constraint" if joint.closes else "joint"
-        turn = A.T if joint.closes else A.T @ at[joint.child][1]
-        rpy = Rotation.from_matrix(turn @ (at[joint.child][1] if joint.closes else np.eye(3)))
-        kind = joint.kind if joint.closes else "continuous"
-        lines.append(f'<{tag} name="{name}" type="{kind}"><parent link="{joint.parent}"/>'
-                     f'<child link="{joint.child}"/><origin '
-                     f'xyz="{_words(A.T @ (np.array(joint.at) - o))}" '
-                     f'rpy="{_words(rpy.as_euler("xyz"))}"/>')  # fmt: skip
-        child, axes = at[joint.child]
-        if joint.closes:
-            place = _words(axes.T @ (np.array(joint.at) - child))
-            lines.append(f'<child_origin xyz="{place}"/>')
-        lines.extend(f'<axis xyz="{_words(axes.T @ axis)}"/>' for axis in joint.axes)
-        lines.append(f"</{tag}>")
-    return "\n".join([*lines, "</robot>"])

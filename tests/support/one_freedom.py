@@ -171,48 +171,6 @@ def slider_crank_scene(q, coefficients, a=0.1, b=0.35, offset=0.02):
     return driven(scene, coefficients)
 
 
-# ---------------------------------------------------------------------------- four-bar
-
-FOURBAR = ("crank", "coupler", "rocker")
-
-
-def four_bar(a=0.2, b=0.5, c=0.4, d=0.6):
-    """In the plane of x and z: crank a at the angle q above x, coupler b, rocker c, ground d."""
-    a, b, c, d = (mp.mpf(str(x)) for x in (a, b, c, d))
-
-    def poses(q):
-        crank = vector(mp.cos(q), 0, mp.sin(q))
-        pin, post = a * crank, vector(d, 0, 0)
-        gap = post - pin
-        far = dot(gap, gap)
-        along = (b**2 - c**2 + far) / (2 * far)
-        across = mp.sqrt(b**2 / far - along**2)
-        knee = pin + along * gap + across * vector(-gap[2], 0, gap[0])
-        coupler, rocker = (knee - pin) / b, (knee - post) / c
-        return [(pin / 2, y_axes(crank)), (pin + b / 2 * coupler, y_axes(coupler)),
-                (post + c / 2 * rocker, y_axes(rocker))]  # fmt: skip
-
-    masses = [mp.mpf(x) for x in ("0.5", "1.1", "0.9")]
-    inertias = [("0.001", "0.004", "0.004"), ("0.002", "0.03", "0.031"), ("0.002", "0.02", "0.02")]
-    return OneFreedom(poses, masses, inertias)
-
-
-def four_bar_scene(q, coefficients, a=0.2, b=0.5, c=0.4, d=0.6):
-    """The same as a scene with four revolutes, of which three rows are redundant."""
-    scene = dap.Scene(name="four-bar")
-    add_bodies(scene, FOURBAR, four_bar(a, b, c, d), q)
-    for name, length in (("crank", a), ("coupler", b), ("rocker", c)):
-        scene.add_point(f"{name}_1", body=name, sPp=[-length / 2, 0.0, 0.0])
-        scene.add_point(f"{name}_2", body=name, sPp=[length / 2, 0.0, 0.0])
-    scene.add_point("post", body="ground", sPp=[d, 0.0, 0.0])
-    for name, i, j in (("A", "crank_1", "ground.O"), ("B", "coupler_1", "crank_2"),
-                       ("C", "coupler_2", "rocker_2"), ("D", "rocker_1", "post")):  # fmt: skip
-        first, second = (end.partition("_")[0].partition(".")[0] for end in (i, j))
-        second = "ground" if second == "post" else second
-        scene.add_joint("rev", name, P_i=i, P_j=j, a_i=f"{first}.y", a_j=f"{second}.y")
-    return driven(scene, coefficients)
-
-
 # ---------------------------------------------------------------------------- double wishbone
 
 WISHBONE = ("lower", "upper", "upright")

@@ -1,5 +1,7 @@
 """Reference problems with closed forms or published digits, made through the public API."""
 
+import numpy as np
+
 import dap3d_core as dap
 
 ROD = (1e-3, 1 / 12, 1 / 12)  # uniform rod of 1 m and 1 kg along x, made thin but not infinitely so
@@ -14,24 +16,37 @@ def pendulum():
     return scene
 
 
-def four_bar():
-    """IFToMM A02 with N = 1, made free of redundancy.
-    The cranks turn on revolutes, the coupler hangs on two spherical joints."""
-    scene = dap.Scene(name="A02")
-    for k in range(2):
-        crank, low, pivot = f"crank{k}", f"low{k}", f"pivot{k}"
-        scene.add_body(crank, mass=1.0, Jp=(1 / 12, 1e-3, 1 / 12), r=(k, 0.5, 0.0),
-                       r_dot=(0.5, 0.0, 0.0), w=(0.0, 0.0, -1.0))  # fmt: skip
-        scene.add_point(low, crank, (0.0, -0.5, 0.0))
-        scene.add_point(f"high{k}", crank, (0.0, 0.5, 0.0))
-        scene.add_point(pivot, "ground", (float(k), 0.0, 0.0))
-        scene.add_joint("rev", f"A{k}", P_i=low, P_j=pivot, a_i=f"{crank}.z", a_j="ground.z")
-    scene.add_body("coupler", mass=1.0, Jp=ROD, r=(0.5, 1.0, 0.0), r_dot=(1.0, 0.0, 0.0))
-    for k in range(2):
-        scene.add_point(f"end{k}", "coupler", (k - 0.5, 0.0, 0.0))
-        scene.add_joint("sph", f"B{k}", P_i=f"end{k}", P_j=f"high{k}")
+def four_bars(count, angle=0.0, tips="rev"):
+    """IFToMM A02: ``count`` parallelograms in a row; cranks at an angle turn at 1 rad/s.
+    2 count + 1 rods of 1 m and 1 kg. Of spatial revolutes three rows of each loop are redundant; of
+    couplers whose ends (``tips``) are on spherical joints none is."""
+    scene = dap.Scene(name=f"A02 of {count}")
+    up = np.array([-np.sin(angle), np.cos(angle), 0.0])
+    across = np.array([np.cos(angle), np.sin(angle), 0.0])
+    p = (np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2))
+    for k in range(count + 1):
+        crank, foot = f"crank{k}", np.array([float(k), 0.0, 0.0])
+        scene.add_body(crank, mass=1.0, Jp=(1 / 12, 1e-3, 1 / 12), r=foot + up / 2, p=p,
+                       r_dot=across / 2, w=(0.0, 0.0, -1.0))  # fmt: skip
+        scene.add_point(f"A{k}", crank, (0.0, -0.5, 0.0))
+        scene.add_point(f"B{k}", crank, (0.0, 0.5, 0.0))
+        scene.add_point(f"post{k}", "ground", foot)
+        axes = {"a_i": f"{crank}.z", "a_j": "ground.z"}
+        scene.add_joint("rev", f"A{k}", P_i=f"A{k}", P_j=f"post{k}", **axes)
+    for k in range(1, count + 1):
+        coupler, middle = f"coupler{k}", np.array([k - 0.5, 0.0, 0.0])
+        scene.add_body(coupler, mass=1.0, Jp=ROD, r=middle + up, r_dot=across)
+        for side, near, x in (("L", k - 1, -0.5), ("R", k, 0.5)):
+            end = scene.add_point(f"{side}{k}", coupler, (x, 0.0, 0.0))
+            axes = {"a_i": f"{coupler}.z", "a_j": f"crank{near}.z"} if tips == "rev" else {}
+            scene.add_joint(tips, end, P_i=end, P_j=f"B{near}", **axes)
     scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
     return scene
+
+
+def four_bar():
+    """IFToMM A02 with N = 1, made free of redundancy."""
+    return four_bars(1, tips="sph")
 
 
 def free_body(Jp, w, **more):
@@ -44,8 +59,6 @@ def free_body(Jp, w, **more):
 def heavy_top(theta, spin, precession):
     """G4: symmetric heavy top in steady precession.
     The mass centre is 0.1 m from the pivot; A = 0.02 about the pivot, C = 0.005."""
-    import numpy as np
-
     c, s = np.cos(theta), np.sin(theta)
     axis = np.array([0.0, s, c])
     scene = dap.Scene(name="heavy top")
@@ -61,40 +74,27 @@ def heavy_top(theta, spin, precession):
     return scene
 
 
-def chain(n):
-    """n uniform rods of 1 m and 1 kg, planar, from rest along +x, on ground, gravity along -y."""
+def chain(n, joints=("sph",), wgt=(0.0, -1.0, 0.0)):
+    """n uniform rods of 1 m and 1 kg, from rest along +x, on ground; types of joints in turn.
+    Of spherical ones, or of those and revolutes about y under a weight along -z, it is planar."""
     scene = dap.Scene(name=f"chain of {n}")
     outer = "ground.O"
     for k in range(n):
-        scene.add_body(f"b{k}", mass=1.0, Jp=ROD, r=(k + 0.5, 0.0, 0.0))
-        scene.add_point(f"in{k}", f"b{k}", (-0.5, 0.0, 0.0))
-        scene.add_joint("sph", f"J{k}", P_i=f"in{k}", P_j=outer)
-        outer = scene.add_point(f"out{k}", f"b{k}", (0.5, 0.0, 0.0))
-    scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
-    return scene
-
-
-def row_of_four_bars(count):
-    """Cranks on revolutes to ground, neighbours joined by couplers on spherical joints."""
-    scene = dap.Scene(name="four-bars")
-    for k in range(count + 1):
-        scene.add_body(f"crank{k}", mass=1.0, Jp=(0.1, 0.02, 0.1), r=(float(k), 0.5, 0.0))
-        scene.add_point(f"A{k}", f"crank{k}", (0.0, -0.5, 0.0))
-        scene.add_point(f"B{k}", f"crank{k}", (0.0, 0.5, 0.0))
-        scene.add_point(f"O{k}", "ground", (float(k), 0.0, 0.0))
-        scene.add_joint("rev", f"R{k}", P_i=f"A{k}", P_j=f"O{k}", a_i=f"crank{k}.z", a_j="ground.z")
-    for k in range(count):
-        scene.add_body(f"rod{k}", mass=1.0, Jp=(0.02, 0.1, 0.1), r=(k + 0.5, 1.0, 0.0))
-        for side, x in ((0, -0.5), (1, 0.5)):
-            scene.add_point(f"C{k}_{side}", f"rod{k}", (x, 0.0, 0.0))
-            scene.add_joint("sph", f"S{k}_{side}", P_i=f"C{k}_{side}", P_j=f"B{k + side}")
-    scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
+        body, keyword = f"b{k}", joints[k % len(joints)]
+        scene.add_body(body, mass=1.0, Jp=ROD, r=(k + 0.5, 0.0, 0.0))
+        inner = scene.add_point(f"in{k}", body, (-0.5, 0.0, 0.0))
+        axes = {}
+        if keyword == "rev":
+            axes = {"a_i": f"{body}.y", "a_j": f"b{k - 1}.y" if k else "ground.y"}
+        scene.add_joint(keyword, f"J{k}", P_i=inner, P_j=outer, **axes)
+        outer = scene.add_point(f"out{k}", body, (0.5, 0.0, 0.0))
+    scene.add_force("weight", "gravity", wgt=wgt)
     return scene
 
 
 def everything():
     """A row of four-bars with springs, a free body, friction, a driver."""
-    scene, first, last, joint = row_of_four_bars(9), "crank1", "rod8", "R5"
+    scene, first, last, joint = four_bars(9, tips="sph"), "crank1", "coupler9", "A5"
     bodies = list(scene.bodies)
     scene.add_body("loose", mass=2.0, Jp=(1.0, 1.1, 1.2), r=(0.0, 0.0, 3.0), w=(0.1, 0.2, 0.3))
     for n, (i, j) in enumerate([(first, bodies[0]), (first, last), (last, "ground"),

@@ -3,60 +3,9 @@
 import numpy as np
 
 import dap3d_core as dap
-from support.problems import ROD
+from support.problems import four_bars
 
 G = 9.81
-UPRIGHT = (1 / 12, 1e-3, 1 / 12)  # the same rod along y
-
-
-def four_bars(count):
-    """IFToMM A02: ``count`` parallelograms in a row, every joint a spatial revolute.
-    2 count + 1 rods of 1 m and 1 kg; cranks upright at the start, couplers level, vx(B0) = 1
-    m/s."""
-    scene = dap.Scene(name=f"A02 of {count}")
-    for k in range(count + 1):
-        crank = f"crank{k}"
-        scene.add_body(crank, mass=1.0, Jp=UPRIGHT, r=(k, 0.5, 0.0),
-                       r_dot=(0.5, 0.0, 0.0), w=(0.0, 0.0, -1.0))  # fmt: skip
-        scene.add_point(f"low{k}", crank, (0.0, -0.5, 0.0))
-        scene.add_point(f"high{k}", crank, (0.0, 0.5, 0.0))
-        scene.add_point(f"pivot{k}", "ground", (float(k), 0.0, 0.0))
-        scene.add_joint("rev", f"A{k}", P_i=f"low{k}", P_j=f"pivot{k}",
-                        a_i=f"{crank}.z", a_j="ground.z")  # fmt: skip
-    for k in range(count):
-        coupler = f"coupler{k}"
-        scene.add_body(coupler, mass=1.0, Jp=ROD, r=(k + 0.5, 1.0, 0.0), r_dot=(1.0, 0.0, 0.0))
-        for side, end in enumerate(("left", "right")):
-            scene.add_point(f"{end}{k}", coupler, (side - 0.5, 0.0, 0.0))
-            scene.add_joint("rev", f"{end}_B{k}", P_i=f"{end}{k}", P_j=f"high{k + side}",
-                            a_i=f"{coupler}.z", a_j=f"crank{k + side}.z")  # fmt: skip
-    scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
-    return scene
-
-
-def bricard():
-    """IFToMM A04: five rods on six revolutes, one freedom, 30 rows of which 29 are independent."""
-    corners = np.array(
-        [(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0, 0, 1)], dtype=float
-    )
-    axes = "yzxyzx"
-    scene = dap.Scene(name="A04")
-    for k in range(5):
-        along = corners[k + 1] - corners[k]
-        middle = 0.5 * (corners[k] + corners[k + 1])
-        Jp = np.where(np.abs(along) > 0.5, 1 / 600, 0.25 / 3 + 0.01 / 12)
-        scene.add_body(f"rod{k}", mass=1.0, Jp=tuple(Jp), r=tuple(middle))
-        scene.add_point(f"tail{k}", f"rod{k}", tuple(-0.5 * along))
-        scene.add_point(f"head{k}", f"rod{k}", tuple(0.5 * along))
-    scene.add_point("last", "ground", tuple(corners[5]))
-    for k, axis in enumerate(axes):
-        P_i = f"tail{k}" if k < 5 else "head4"
-        P_j = "ground.O" if k == 0 else f"head{k - 1}" if k < 5 else "last"
-        i = f"rod{min(k, 4)}"
-        j = "ground" if k in (0, 5) else f"rod{k - 1}"
-        scene.add_joint("rev", f"J{k}", P_i=P_i, P_j=P_j, a_i=f"{i}.{axis}", a_j=f"{j}.{axis}")
-    scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
-    return scene
 
 
 def bennett(turn=1.1):

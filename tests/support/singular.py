@@ -47,37 +47,6 @@ def strut():
     return scene
 
 
-def dead_centre():
-    """A slider driven to its dead centre, x = 3 - (1 - t)^2 / 2 m; crank of 1 m, rod of 2 m."""
-    x, speed = 2.5, 1.0
-    cosine = (x * x - 3.0) / (2.0 * x)
-    crank, rod = np.arccos(cosine), -np.arcsin(np.sin(np.arccos(cosine)) / 2.0)
-    turn = speed * (x * x + 3.0) / (2.0 * x * x) / -np.sin(crank)
-    lean = -turn * np.cos(crank) / (2.0 * np.cos(rod))
-    scene, along = dap.Scene(name="dead centre"), np.array([1.0, 0.0, 0.0])
-    joint = np.array([np.cos(crank), np.sin(crank), 0.0])
-    joint_rate = turn * np.array([-joint[1], joint[0], 0.0])
-    for name, angle, middle, rate, w, length in (
-        ("crank", crank, joint / 2, joint_rate / 2, turn, 1.0),
-        ("rod", rod, (joint + x * along) / 2, (joint_rate + speed * along) / 2, lean, 2.0),
-    ):
-        p = (np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2))
-        J = length**2 / 12
-        scene.add_body(name, mass=1.0, Jp=(0.001, J, J), r=tuple(middle), p=p,
-                       r_dot=tuple(rate), w=(0.0, 0.0, w))  # fmt: skip
-        for end, at in (("0", -0.5), ("1", 0.5)):
-            scene.add_point(name + end, name, (at * length, 0.0, 0.0))
-    scene.add_body("slider", mass=1.0, Jp=(0.1,) * 3, r=(x, 0, 0), r_dot=(speed, 0, 0))
-    scene.add_function("a", "push", coeff=(0.0, 1.0, -0.5))
-    ends = {"P_i": "slider.O", "P_j": "ground.O", "a_j": "ground.x"}
-    scene.add_joint("rev", "A", P_i="crank0", P_j="ground.O", a_i="crank.z", a_j="ground.z")
-    scene.add_joint("sph", "B", P_i="rod0", P_j="crank1")
-    scene.add_joint("univ", "C", P_i="rod1", P_j="slider.O", a_i="rod.z", n_j="slider.x")
-    scene.add_joint("tran", "S", **ends)
-    scene.add_joint("drive-tran", "drive", function="push", **ends)
-    return scene
-
-
 def arm(rate=1.0 / 3.7):
     """Two links of 1 m whose hand is driven along x: 1 m + rate t, out of reach from 2 m on."""
     scene = dap.Scene(name="arm")

@@ -3,33 +3,13 @@
 import numpy as np
 
 import dap3d_core as dap
-from dap3d_core.interface import Body, Force, Joint, Vector2, body, number, vector2
-from dap3d_core.kernels import cross, dot, eye, neg, scale, sqrt, sub
+from dap3d_core.interface import Body, Force, Joint, body, number
+from dap3d_core.kernels import eye, scale, sub
 from support.own_types import registry_of
 
 ZERO = (0.0, 0.0, 0.0)
 #: Of the Maxwell element in ``pulled``: stiffness, damping, rest length, mass, start.
 K, C, L0, MASS, X0, Z0 = 50.0, 3.0, 1.0, 2.0, 1.5, 0.1
-
-
-class Maxwell(Force):
-    """Spring and damper in series between two points; z is the elongation of the damper.
-    z_dot = k/c (l - l0 - z)"""
-
-    keyword = "test-maxwell"
-    states = ("z",)
-    d: Vector2 = vector2(direction=True)
-    k: float = number(unit="N/m", positive=True)
-    c: float = number(unit="N s/m", positive=True)
-    l0: float = number(0.0, unit="m")
-
-    def rate(d, z, k, c, l0):
-        return k / c * (sqrt(dot(d, d)) - l0 - z)
-
-    def wrench(d, z, k, l0, s_P_i, s_P_j):
-        length = sqrt(dot(d, d))
-        f = scale(k * (length - l0 - z) / length, d)
-        return (f, cross(s_P_i, f)), (neg(f), cross(s_P_j, neg(f)))
 
 
 class Lag(Force):
@@ -76,7 +56,7 @@ class Steered(Joint):
         return (target - z) / tau
 
 
-REGISTRY = registry_of(Maxwell, Lag, Steered)
+REGISTRY = registry_of(Lag, Steered)
 
 
 def pulled(**fields):
@@ -84,7 +64,7 @@ def pulled(**fields):
     scene = dap.Scene(name="pulled")
     scene.add_body("cart", mass=MASS, Jp=(1.0, 1.0, 1.0), r=(X0, 0.0, 0.0))
     given = {"k": K, "c": C, "l0": L0, "z_0": Z0} | fields
-    scene.add_force("test-maxwell", "spring", P_i="cart.O", P_j="ground.O", **given)
+    scene.add_force("maxwell", "spring", P_i="cart.O", P_j="ground.O", **given)
     return scene
 
 

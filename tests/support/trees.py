@@ -3,6 +3,7 @@
 import numpy as np
 
 import dap3d_core as dap
+from support.problems import chain
 
 #: Joints of random trees, with their fields by the sides of child (c) and parent (p).
 JOINTS = ("rev", "sph", "cyl", "tran", "univ")
@@ -10,20 +11,7 @@ JOINTS = ("rev", "sph", "cyl", "tran", "univ")
 
 def mixed_chain(n):
     """A chain of n rods with revolute and spherical joints in turn."""
-    scene = dap.Scene(name=f"mixed chain of {n}")
-    outer = "ground.O"
-    for k in range(n):
-        name = f"b{k}"
-        scene.add_body(name, mass=1.0, Jp=(0.001, 1 / 12, 1 / 12), r=(k + 0.5, 0.0, 0.0))
-        inner = scene.add_point(f"in{k}", name, (-0.5, 0.0, 0.0))
-        if k % 2:
-            scene.add_joint("sph", f"J{k}", P_i=inner, P_j=outer)
-        else:
-            axis = f"b{k - 1}.y" if k else "ground.y"
-            scene.add_joint("rev", f"J{k}", P_i=inner, P_j=outer, a_i=f"{name}.y", a_j=axis)
-        outer = scene.add_point(f"out{k}", name, (0.5, 0.0, 0.0))
-    scene.add_force("weight", "gravity")
-    return scene
+    return chain(n, ("rev", "sph"), (0.0, 0.0, -1.0))
 
 
 def random_tree(n, seed=0, joints=JOINTS, free=0.0, lag=5):

@@ -7,6 +7,12 @@ from support.whipple import matrices, system
 
 import dap3d_core as dap
 
+#: Eigenvalues that the paper prints in its table 2, by the forward speed, m/s.
+PRINTED = {
+    0.0: [-5.530943717653930, -3.131643247906560, 3.131643247906560, 5.530943717653930],
+    5.0: [-14.0783896927982, -0.322866429004087,
+          -0.775341882195845 - 4.46486771378823j, -0.775341882195845 + 4.46486771378823j],
+}  # fmt: skip
 #: Lean rate at the start, rad/s: what is left out of linear equations is its third power.
 SMALL = 1e-4
 
@@ -30,6 +36,23 @@ def test_published_matrices():
     ]
     for matrix, numbers in zip((M, C1, K0, K2), printed, strict=True):
         np.testing.assert_allclose(matrix, numbers, rtol=0.0, atol=1e-14 * np.abs(numbers).max())
+
+
+@pytest.mark.parametrize("speed", [float(v) for v in range(11)])
+def test_eigenvalues(speed):
+    """Weave, capsize and castering at every speed; all other eigenvalues are exactly zero.
+    They are the place (x, y), heading, both wheels' angles, and the speed."""
+    scene = dap.load("bicycle")
+    scene.parameters |= {"v": speed, "lean_rate": 0.0}
+    lin = dap.linearize(scene)
+    assert np.sum(lin.eigenvalues == 0.0) == 6
+    own = lin.eigenvalues[6:]
+    for value in (*np.linalg.eigvals(system(speed)), *PRINTED.get(speed, ())):
+        nearest = own[np.argmin(np.abs(own - value))]
+        # the capsize eigenvalue near its zero at 6.02 m/s is the small difference of large terms
+        assert abs(nearest - value) <= 1e-12 * max(abs(value), 1.0)
+    assert lin.is_steady
+    assert lin.stable == (4.3 < speed < 6.02)  # table 2: self-stable from 4.29 to 6.02 m/s
 
 
 @pytest.mark.slow

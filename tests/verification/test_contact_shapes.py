@@ -69,24 +69,6 @@ def test_a_ball_slides_over_the_rim_of_a_standing_cylinder():
 
 
 @pytest.mark.slow
-def test_a_lying_cylinder_slides_then_rolls_with_two_thirds_of_its_speed():
-    v, mu, radius = 3.0, 0.3, 0.1
-    scene = dap.Scene(name="roller")
-    Jp = [0.02, 0.5 * 2.0 * radius**2, 0.02]
-    scene.add_body("roller", mass=2.0, Jp=Jp, r=[0.0, 0.0, radius], r_dot=[v, 0.0, 0.0])
-    scene.add_force("weight", "g")
-    shape = {"P_i": "roller.O", "a_i": "roller.y", "radius": radius, "length": 0.3}
-    scene.add_contact("cylinder_plane", "floor", **shape, mu=mu)
-    result = dap.simulate(scene, t_end=1.5, dt=0.1, **TIGHT)
-    assert first(result, "stick").t == pytest.approx(v / (3.0 * mu * G), abs=TOLERANCE)
-    assert result.rd[-1, 0] == pytest.approx([2.0 / 3.0 * v, 0.0, 0.0], abs=TOLERANCE)
-    forces = result.contact("floor").normal_force
-    assert forces[:, :2] == pytest.approx(G, abs=1e-9)  # the rims, one half each
-    assert np.all(forces[:, 2:] == 0.0)
-    assert result.ledger["energy"].value < TOLERANCE
-
-
-@pytest.mark.slow
 def test_a_disk_rolls_on_its_rim_about_a_centre_at_rest():
     """Omega^2 sin(alpha) = g / (k a), J = k m a^2 about a diameter (Moffatt, Nature 404, 2000)."""
     a, alpha, k = 0.2, 0.4, 0.25

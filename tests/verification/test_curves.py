@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 from scipy.special import ellipk
 
 import dap3d_core as dap
@@ -96,33 +95,6 @@ def test_a_roller_follows_a_table():
     bound = 2.0 * 5.0 / 384.0 * (TURN / 48) ** 4 * A
     assert result.r[:, 1, 1] == pytest.approx(height(result.t)[0], abs=bound)
     assert set(result.contact("contact").mode[1:]) == {1}  # a gap of the splines' error at first
-
-
-def test_a_spring_loses_its_cam():
-    """The roller lifts where m y'' = -m g - k (y - y_0 + f), falls back, and stays."""
-    rate, k, f = 30.0, 100.0, 0.02
-    scene = cam(add_circle, rate)
-    scene.add_point("seat", body="ground", sPp=[0.0, 0.6, 0.0])
-    free = 0.6 - height(0.0)[0] + f
-    scene.add_force("ptp", "spring", P_i="roller.O", P_j="seat", k=k, l0=free)
-    result = dap.simulate(scene, t_end=0.25, **TIGHT)
-
-    def load(t):
-        y, _, y_ddot = height(t, rate)
-        return 0.5 * (y_ddot + G) + k * (free - 0.6 + y)
-
-    lifts = brentq(load, 0.0, 0.5 * np.pi / rate, xtol=1e-15)
-    assert first(result, "lift").t == pytest.approx(lifts, abs=TOLERANCE)
-    # m y'' = -m g - k (y - s), about its own place of rest
-    rest, omega = 0.6 - free - 0.5 * G / k, np.sqrt(k / 0.5)
-    y, y_dot, _ = height(lifts, rate)
-
-    def gap(t):
-        a = omega * (t - lifts)
-        return rest + (y - rest) * np.cos(a) + y_dot / omega * np.sin(a) - height(t, rate)[0]
-
-    lands = brentq(gap, lifts + 0.01, lifts + 0.25, xtol=1e-15)
-    assert first(result, "impact").t == pytest.approx(lands, abs=TOLERANCE)
 
 
 @pytest.mark.slow

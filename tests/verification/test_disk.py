@@ -115,17 +115,6 @@ def test_other_words_for_slip():
         assert one.joints[0].type_info.type.__name__ == other.joints[0].type_info.type.__name__
 
 
-def test_the_switch_is_the_sine_of_the_lean():
-    """Positive while the angle between disk and ground has a sine above 0.02."""
-    from dap3d_joints.disk import Disk
-
-    for lean, sign in ((0.021, 1.0), (0.019, -1.0)):
-        A = ((1, 0, 0), (0, np.cos(lean), -np.sin(lean)), (0, np.sin(lean), np.cos(lean)))
-        tilted = tuple(tuple(row) for row in np.array(A) @ [[1, 0, 0], [0, 0, -1], [0, 1, 0]])
-        assert Disk.switch(tilted, 0.02) == pytest.approx(np.sin(lean) - 0.02, abs=1e-12)
-        assert np.sign(Disk.switch(tilted, 0.02)) == sign
-
-
 @pytest.mark.parametrize("slip", ["z", "xyz", "nz"])
 def test_a_disk_that_the_ground_pulls_down_is_noted(slip):
     """A spring to a heavy body that rises at 1 m/s lifts by 10 t N: m g from t = 1.962 s on."""

@@ -73,24 +73,6 @@ def test_a_pendulum_comes_to_hang_unless_it_starts_upright(angle, is_inverted):
     assert ("unstable" in "".join(found.notes)) is is_inverted
 
 
-def test_a_quarter_car_sinks_into_its_springs():
-    """z by Hooke's law; the damper at rest has no part in it."""
-    sprung, wheel, k, tyre = 300.0, 40.0, 2e4, 2e5
-    scene = dap.Scene(name="quarter car")
-    scene.add_body("sprung", mass=sprung, Jp=(10, 10, 10), r=(0, 0, 0.8))
-    scene.add_body("wheel", mass=wheel, Jp=(1, 1, 1), r=(0, 0, 0.3))
-    for body in ("sprung", "wheel"):
-        scene.add_joint("tran", P_i=f"{body}.O", P_j="ground.O", a_j="ground.z")
-    scene.add_force("ptp", P_i="sprung.O", P_j="wheel.O", k=k, c=1e3, l0=0.5)
-    scene.add_force("ptp", P_i="wheel.O", P_j="ground.O", k=tyre, l0=0.3)
-    scene.add_force("weight")
-    found = dap.equilibrium(scene)
-    z = 0.3 - (sprung + wheel) * G / tyre
-    assert found.r[1] == pytest.approx([0, 0, z], abs=ULP)
-    assert found.r[0] == pytest.approx([0, 0, z + 0.5 - sprung * G / k], abs=ULP)
-    assert found.stable
-
-
 def test_a_door_on_three_hinges_and_what_of_its_hinges_is_unique():
     """2 N m turn it by 0.4 rad; only the sum of the hinges' forces is known."""
     found = dap.equilibrium(at_rest.door())

@@ -163,28 +163,6 @@ def test_several_events_in_one_step_in_order(flight):
     assert sorted(e.name for e in result.events) == sorted(2 * "0123")
 
 
-@pytest.mark.slow
-def test_a_resumed_run_finds_the_same_events(flight, tmp_path):
-    """Bit for bit, after an interruption between the two passages."""
-    apex = 50.0 / G
-    event = dap.Event("b.r.z", at=apex * (1.0 - 1e-4))
-    whole = dap.simulate(flight, t_end=2.0, dt=0.005, events=[event])
-
-    class StopError(Exception):
-        pass
-
-    def interrupt(t, t_end):
-        if t >= 1.0091:
-            raise StopError
-
-    with pytest.raises(StopError):
-        dap.simulate(flight, t_end=2.0, dt=0.005, events=[event], output=tmp_path / "a.nc",
-                     checkpoint=np.inf, progress=interrupt)  # fmt: skip
-    resumed = dap.resume(tmp_path / "a.nc.checkpoint", events=[event])
-    assert resumed.events == whole.events
-    np.testing.assert_array_equal(resumed.u, whole.u)
-
-
 @pytest.mark.parametrize("every", [1e-300, 1e-9, 1.9e-6])
 def test_an_every_without_end_is_refused(flight, every):
     with pytest.raises(ValueError, match=r"every should be at least 2e-06 s"):
@@ -273,18 +251,3 @@ def test_no_step_samples_the_law_behind_a_stop(integrator, settings):
     found = [e for e in result.events if e.kind == "jump"]
     assert [e.t for e in found[:6]] == pytest.approx(times, abs=1e-13)
     assert found[0].u_after[9] == pytest.approx(0.8 * G * fall, abs=1e-13)
-
-
-@pytest.mark.slow
-def test_rk4_keeps_its_order_with_an_event():
-    """The instant of an event converges as h^4: the ratio for half the step is about 16."""
-    scene = pendulum(RELEASE)
-    event = dap.Event("b.r.x", below=0.0, action="stop")
-    errors = []
-    for step in (0.04, 0.02, 0.01):
-        result = dap.simulate(
-            scene, t_end=1.0, dt=1.0, integrator="rk4", step=step, method="joint", events=[event]
-        )
-        errors.append(abs(result.t[-1] - 0.25 * period()))
-    orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert np.all(orders > 3.5), (orders, errors)

@@ -92,18 +92,6 @@ def test_an_input_that_is_zero_at_first_does_not_make_a_scene_conservative():
     assert all(entry.ok is not False for entry in result.ledger.values())
 
 
-@pytest.mark.parametrize(
-    ("joint", "quantity"), [("rel-tran", "block.rd.z"), ("rel-rot", "block.w.z")]
-)
-def test_a_driver_holds_the_rate_that_is_its_input(joint, quantity):
-    """The start is corrected to it, and it stays; ground is body j, so the sign turns."""
-    scene = block()
-    scene.add_joint(joint, "drive", body_i="block", a_j="ground.z", input="level")
-    scene.add_force("weight", "gravity")
-    result = end(scene)
-    assert result.quantity(quantity).values == pytest.approx(np.full(5, -0.75), abs=1e-12)
-
-
 def test_an_input_is_a_quantity_of_results(tmp_path):
     """By name, in expressions, in files and data sets; it is not a name of something else."""
     scene = block()

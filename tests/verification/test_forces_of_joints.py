@@ -32,42 +32,6 @@ def test_a_hinge_runs_down_by_its_friction(integrator):
     np.testing.assert_allclose(result.work, lost, rtol=0, atol=1e-9)
 
 
-def test_a_hinge_stops_after_the_angle_of_constant_friction():
-    """At t = I w / n, after I w^2 / (2 n), and pi^2 / 12 I w_tol^2 / n of creep more."""
-    inertia, spin, n, w_tol = 0.3, 2.0, 0.4, 1e-3
-    scene = hinge(inertia, spin)
-    scene.add_force("rot_friction", "rub", body_i="wheel", body_j="ground", axis="wheel.z", n_c=n,
-                    w_tol=w_tol)  # fmt: skip
-    result = dap.simulate(scene, t_end=3.0, dt=0.25, integrator="radau", **TIGHT)
-    expected = np.maximum(spin - n / inertia * result.t, 0.0)  # it stops at 1.5 s
-    far = np.abs(result.t - 1.5) > 0.1
-    np.testing.assert_allclose(result.w[far, 0, 2], expected[far], rtol=0, atol=1e-9)
-    angle = 2.0 * np.arctan2(result.p[-1, 0, 3], result.p[-1, 0, 0])
-    creep = np.pi**2 / 12.0 * inertia * w_tol**2 / n
-    assert angle == pytest.approx(0.5 * inertia * spin**2 / n + creep, abs=1e-9)
-    assert creep == pytest.approx(6.17e-7, rel=0.001)
-
-
-def test_a_block_on_a_slope_creeps_where_it_should_stick():
-    """v = v_tol artanh(m g sin / f_c), 0.46 mm/s for 0.43 of the friction; the load has no part."""
-    scene, slope = dap.Scene(name="slope"), 0.3
-    scene.add_body("block", mass=2.0, Jp=(0.1, 0.1, 0.1))
-    scene.add_vector("down", "ground", (np.cos(slope), 0.0, -np.sin(slope)))
-    c, s = np.cos(slope / 2), np.sin(slope / 2)
-    scene.bodies["block"].p = (c, 0.0, s, 0.0)
-    scene.add_joint("tran", "way", P_i="block.O", P_j="ground.O", a_j="down",
-                    A_c=((np.cos(slope), 0, -np.sin(slope)), (0, 1, 0),
-                         (np.sin(slope), 0, np.cos(slope))))  # fmt: skip
-    scene.add_force("weight", "g", gravity=9.81, wgt=(0.0, 0.0, -1.0))
-    load = 2.0 * 9.81 * np.sin(slope)
-    scene.add_force("tran_friction", "rub", P_i="block.O", a_j="down", f_c=load / 0.43,
-                    v_tol=1e-3)  # fmt: skip
-    result = dap.simulate(scene, t_end=1.0, dt=0.5, integrator="radau", rtol=1e-10, atol=1e-13)
-    creep = 1e-3 * np.arctanh(0.43)
-    speed = np.linalg.norm(result.r[2, 0] - result.r[1, 0]) / 0.5
-    assert speed == pytest.approx(creep, rel=1e-8)  # what it starts with is over in 1 ms
-
-
 @pytest.mark.parametrize("fields", [{"k": 30.0}, {"function": "law"}])
 def test_a_bead_on_a_turning_rod(fields):
     """m x'' = m W^2 x - k (x - x_0) - c x' + f, from x = 0, through it; all turns along."""

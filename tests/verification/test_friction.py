@@ -36,46 +36,6 @@ def test_a_block_slides_down_an_incline(method, mu):
     assert np.linalg.norm(result.Lam[-1, 3:]) == pytest.approx(2.0 * G * np.cos(SLOPE), rel=1e-9)
 
 
-def test_a_block_that_should_stick_creeps():
-    """Where mu > tan(30 deg) the block ends at the speed at which friction carries it."""
-    mu, v_tol = 0.8, 1e-3
-    result = dap.simulate(incline(mu, v_tol=v_tol), t_end=0.1, dt=0.05, rtol=1e-6)
-    creep = v_tol * np.arctanh(np.tan(SLOPE) / mu)
-    assert np.linalg.norm(result.rd[-1, 0]) == pytest.approx(creep, rel=1e-6)
-
-
-def test_a_loaded_pin_stops_its_wheel():
-    """rev: a balanced wheel, load m g on a pin of radius r: w' = -mu r m g / J until it rests."""
-    mu, radius, mass, J, spin = 0.3, 0.02, 5.0, 0.1, 20.0
-    scene = dap.Scene(name="wheel")
-    scene.add_body("wheel", mass=mass, Jp=(J, J, J), w=(0.0, spin, 0.0))
-    scene.add_joint("rev", "pin", P_i="wheel.O", P_j="ground.O", a_i="wheel.y", a_j="ground.y")
-    scene.add_force("weight")
-    scene.add_force("friction", joint="pin", mu=mu, radius=radius, v_tol=1e-3)
-    result = dap.simulate(scene, t_end=2.0, dt=1.0)
-    slowing = mu * radius * mass * G / J
-    wanted = spin - slowing * result.t
-    assert result.w[:, 0, 1] == pytest.approx(wanted, rel=1e-9)
-    assert result.ledger["energy"].ok
-
-
-def test_a_sliding_disk_is_braked_by_the_ground():
-    """disk z: a disk upright and not turning, sliding sideways: a = -mu g; its load is m g."""
-    mu, radius, mass = 0.2, 0.5, 3.0
-    scene = dap.Scene(name="sliding disk")
-    scene.add_body("disk", mass=mass, Jp=(1e3, 1e3, 1e3), r=(0.0, 0.0, radius),
-                   r_dot=(2.0, 0.0, 0.0))  # fmt: skip
-    scene.add_joint("disk", "contact", body_i="disk", slip="z", radius=radius)
-    scene.add_force("weight")
-    scene.add_force("friction", joint="contact", mu=mu, v_tol=1e-3)
-    result = dap.simulate(scene, t_end=0.5, dt=0.5)
-    # the rim also turns back: F R / J = 2e-3 of the acceleration's size is left out of neither side
-    turn = mu * mass * G * radius / 1e3
-    assert result.rd[-1, 0, 0] == pytest.approx(2.0 - mu * G * 0.5, rel=1e-9)
-    assert result.w[-1, 0, 1] == pytest.approx(turn * 0.5, rel=1e-6)
-    assert result.Lam[-1, 0] == pytest.approx(mass * G, rel=1e-9)
-
-
 @pytest.mark.parametrize(("direction", "settles"), [(-1.0, True), (1.0, False)])
 def test_multipliers_that_do_not_settle_are_reported(direction, settles):
     """Painleve's paradox: a light leaning disk slides towards its contact, at s = R (c, -sigma).

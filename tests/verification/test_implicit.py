@@ -120,22 +120,6 @@ def test_joint_coordinates_have_the_motion_of_others(model, t):
     assert all(entry.ok for entry in ours.ledger.values())
 
 
-def test_fixed_steps_are_of_order_five():
-    """The order of steps of a given length is the caller's to know, whatever the tolerances."""
-    compiled = dap.compile(problems.pendulum())
-    u = compiled.start(True, ()).u
-    evaluator = compiled.evaluator
-    evaluator.start(0.0, u)
-    run = INTEGRATORS["radau"].make(
-        evaluator, evaluator.integrated(u), [0.0, 1.0], step=0.01, report_size=evaluator.report_size
-    )
-    while run.status is Status.RUNNING:
-        run.advance(10**9)
-        run.rows()
-    assert run.work.stages == 3
-    assert run.work.Z.shape[0] == 3
-
-
 def test_order_of_the_multipliers_of_the_stages():
     """A01: lambda of the last stage converges with the stage order 3, mu vanishes (HW VII.4)."""
     compiled = dap.compile(problems.pendulum())

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 import dap3d_core as dap
 
@@ -25,53 +24,6 @@ def vibrating():
                       a_j="normal", mu=MU)  # fmt: skip
     scene.add_force("weight", "gravity")
     return scene
-
-
-def way_down(t):
-    """The way of the parcel on the table at times t, by SciPy from switch to switch."""
-
-    def table(s):
-        return -AMPLITUDE * OMEGA**2 * np.sin(OMEGA * s)
-
-    def load(s):
-        return G * np.cos(SLOPE) + table(s) * np.sin(SLOPE)
-
-    def drive(s):  # relative acceleration without friction
-        return G * np.sin(SLOPE) - table(s) * np.cos(SLOPE)
-
-    def slip(s, _):
-        return abs(drive(s)) - MU * load(s)
-
-    def stop(_, y):
-        return y[1]
-
-    slip.terminal = stop.terminal = True
-    now, y, sense, found = 0.0, np.zeros(2), 0.0, np.zeros(len(t))
-    while now < t[-1]:
-        if not sense and slip(now + 1e-9, y) > 0.0:
-            sense = np.sign(drive(now + 1e-9))
-        stop.direction = -sense
-
-        def rate(s, y, sense=sense):
-            return [y[1], drive(s) - sense * MU * load(s)] if sense else [0.0, 0.0]
-
-        begin = now + 1e-9 if sense else now  # the speed is zero at the very begin
-        part = solve_ivp(rate, (begin, t[-1]), y, "DOP853", rtol=1e-11, atol=1e-13, max_step=1e-2,
-                         events=stop if sense else slip, dense_output=True)  # fmt: skip
-        inside = (t >= now) & (t <= part.t[-1])
-        found[inside] = part.sol(t[inside])[0]
-        now, y, sense = part.t[-1], np.array([part.y[0, -1], 0.0]), 0.0
-    return found
-
-
-def test_a_parcel_creeps_down_a_vibrating_incline_on_which_it_would_rest():
-    """tan(10 deg) < 0.3; shaken it slides, and sticks again. Switches are located to 1e-9 s."""
-    result = dap.simulate(vibrating(), t_end=0.5, dt=0.05, rtol=1e-9, atol=1e-11)
-    assert {event.kind for event in result.events} >= {"slip", "stick"}
-    way = (result.r[:, 1] - result.r[:, 0]) @ DOWN
-    assert way[-1] > 0.005
-    np.testing.assert_allclose(way, way_down(result.t), rtol=0, atol=1e-8)
-    assert result.ledger["energy"].ok
 
 
 def test_a_ball_rolls_in_a_groove_and_boxes_slide_beside_it():

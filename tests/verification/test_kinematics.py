@@ -9,20 +9,18 @@ import dap3d_core as dap
 
 #: Coefficients of the driver.
 FAST, SLOW = (0.0, 3.0, 1.5), (0.0, 0.4, 0.3)
-SLIDER, FOURBAR, WISHBONE = "slider-crank", "four-bar", "double wishbone"
+SLIDER, WISHBONE = "slider-crank", "double wishbone"
 
 
 def case(name):
     """A mechanism, its scene, the angle at the start, and its motion q = q_0 + c2 t + c3 t^2."""
     if name == SLIDER:
         return one_freedom.slider_crank(), one_freedom.slider_crank_scene(0.3, FAST), 0.3, FAST
-    if name == FOURBAR:
-        return one_freedom.four_bar(), one_freedom.four_bar_scene(0.7, FAST), 0.7, FAST
     return one_freedom.double_wishbone(), one_freedom.double_wishbone_scene(SLOW), 0.0, SLOW
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [SLIDER, FOURBAR, WISHBONE])
+@pytest.mark.parametrize("name", [SLIDER, WISHBONE])
 def test_motion_and_driving_moment_are_those_of_the_closed_form(name):
     """Positions, velocities, accelerations and the driver's multiplier, to 1e-12.
     Rounding alone is left: eps times the condition of the rows, of order ten here, and for

@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 import pytest
-from support import mechanisms, redundant
+from support import redundant
 from support.process import REPOSITORY
 
 import dap3d_core as dap
@@ -70,7 +70,7 @@ def test_a_door_that_does_not_fit_is_left_open_and_says_so():
 def test_a_start_close_to_a_singular_pose_does_not_bind(angle):
     """A parallelogram on revolutes, nearly in line: as nearly dependent rows as those of hinges
     that bind, but they let it move away. It runs."""
-    scene = mechanisms.four_bar_row(1, np.pi / 2 - angle)
+    scene = redundant.four_bars(1, np.pi / 2 - angle)
     assert not dap.compile(scene).redundancy().bindings
     flat = dap.compile(redundant.four_bars(1))
     assert not flat.redundancy().bindings

@@ -63,18 +63,6 @@ def test_weights_that_springs_carry():
     np.testing.assert_allclose(magnitudes(lin, 6), wanted, rtol=1e-7)  # of the pose: 1e-8
 
 
-def test_inverted_pendulum():
-    """Standing on its hinge the same rod falls at the same rate, and dap3d says that it does."""
-    scene = dap.Scene(name="inverted")
-    scene.add_body("b", mass=1.0, Jp=np.diag(ROD), r=[0, 0, 0.5])
-    scene.add_point("foot", "b", [0, 0, -0.5])
-    hinge(scene, "J", "foot", "ground.O")
-    scene.add_force("weight", "gravity")
-    lin = dap.linearize(scene)
-    np.testing.assert_allclose(lin.eigenvalues, [-(14.715**0.5), 14.715**0.5], rtol=RTOL)
-    assert not lin.stable
-
-
 def test_parallelogram():
     """Three rods, a closed loop with three redundant rows: omega^2 = 6/5 g / l.
     Lagrange: (2/3 m + m) l^2 phi'' = -(2 m l / 2 + m l) g phi."""
@@ -117,23 +105,6 @@ def test_double_pendulum_with_springs_and_dampers():
     modes = np.array([-lin.mode_eigenvalues.real, np.abs(lin.mode_eigenvalues)])
     np.testing.assert_allclose(lin.damping, modes[0] / modes[1], rtol=RTOL)
     np.testing.assert_allclose(lin.frequencies, modes[1] / (2 * np.pi), rtol=RTOL)
-
-
-def test_furuta_pendulum():
-    """An arm that turns freely about z carries a pendulum: a zero pair and one frequency."""
-    m, L, h, Ja, J, Jz = 0.4, 0.3, 0.2, 0.05, 0.007, 0.001
-    scene = dap.Scene(name="Furuta")
-    scene.add_body("arm", mass=1.0, Jp=np.diag([0.01, 0.05, Ja]), r=[0, 0, 0])
-    scene.add_body("pendulum", mass=m, Jp=np.diag([J, J, Jz]), r=[L, 0, -h])
-    scene.add_point("tip", "arm", [L, 0, 0])
-    scene.add_point("top", "pendulum", [0, 0, h])
-    scene.add_joint("rev", "motor", P_i="arm.O", P_j="ground.O", a_i="arm.z", a_j="ground.z")
-    scene.add_joint("rev", "pin", P_i="top", P_j="tip", a_i="pendulum.x", a_j="arm.x")
-    scene.add_force("weight", "gravity")
-    arm, own, both = Ja + m * L**2 + Jz, J + m * h**2, m * L * h
-    expected = np.sqrt(arm * m * G * h / (arm * own - both**2))
-    lin = dap.linearize(scene)
-    np.testing.assert_allclose(np.abs(lin.eigenvalues), [0, 0, expected, expected], rtol=RTOL)
 
 
 @pytest.mark.parametrize("count", [3, 12])
@@ -310,34 +281,6 @@ def test_spinning_structure():
     assert lin.stable
     np.testing.assert_allclose(lin.Omega[:, 2], spin, rtol=1e-12)
     np.testing.assert_allclose(magnitudes(lin, 2), np.sqrt(2 * k / m + 3 * spin**2), rtol=RTOL)
-
-
-def test_governor():
-    """A rod on a hinge of a shaft that a driver turns: it swings about its angle in steady turn.
-    With I, I_3 across and along the rod, about its hinge, c = cos of the angle from the vertical:
-    (I - I_3) W^2 c = m g l, and I x^2 = -(I - I_3) W^2 (2 c^2 - 1) + m g l c."""
-    turn, m, half = 6.0, 1.0, 0.5
-    across, along = 1 / 12 + m * half**2, 1e-3
-    c = m * G * half / ((across - along) * turn**2)
-    tilt = np.arccos(c)
-    p = np.array([np.cos(tilt / 2), 0, -np.sin(tilt / 2), 0])
-    r = rotation(p) @ [0, 0, -half]
-    scene = dap.Scene(name="governor")
-    scene.add_body("shaft", mass=1.0, Jp=np.diag([0.1, 0.1, 0.2]), w=[0, 0, turn])
-    scene.add_body("rod", mass=m, Jp=np.diag(ROD), p=p, r=r, w=[0, 0, turn],
-                   r_dot=np.cross([0, 0, turn], r))  # fmt: skip
-    scene.add_point("top", "rod", [0, 0, half])
-    scene.add_joint("rev", "bearing", P_i="shaft.O", P_j="ground.O", a_i="shaft.z", a_j="ground.z")
-    scene.add_joint("rev", "hinge", P_i="top", P_j="shaft.O", a_i="rod.y", a_j="shaft.y")
-    scene.add_function("a", "speed", coeff=[0.0, -turn, 0.0])  # of ground
-    scene.add_force("weight", "gravity")
-    scene.add_joint("rel-rot", "motor", body_i="shaft", a_j="ground.z", function="speed")
-    lin = dap.linearize(scene)
-    assert lin.dof == 1
-    square = ((across - along) * turn**2 * (1 - 2 * c**2) + m * G * half * c) / across
-    assert lin.is_steady
-    assert lin.stable
-    np.testing.assert_allclose(magnitudes(lin, 2), np.sqrt(abs(square)), rtol=RTOL)
 
 
 def test_the_campbell_diagram_of_the_rotor_model():

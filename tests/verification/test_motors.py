@@ -224,14 +224,6 @@ def test_an_input_is_set_in_a_run():
         assert run.state["guide.angle_rate"] == pytest.approx(rate, abs=1e-9)
 
 
-def test_a_linear_model_has_the_moment_as_an_input():
-    """sqrt(J) theta_ddot = u / sqrt(J), in coordinates of unit mass."""
-    scene = machine()
-    scene.add_force("motor", "motor", joint="guide", torque="signal", limit=10.0)
-    linear = dap.linearize(scene, inputs=("signal",))
-    assert np.max(np.abs(linear.B)) == pytest.approx(J**-0.5, rel=1e-9)
-
-
 def test_the_ledger_has_the_work_of_a_motor():
     """A speed that is a number does work against gravity: the energy is no constant."""
     scene = machine()

@@ -130,26 +130,6 @@ def test_tension_of_the_pendulum():
         np.testing.assert_allclose(on[slot].moment, 0, atol=1e-8)
 
 
-def test_hanging_chain():
-    """At rest each joint holds the weight of all rods below it, up on one, down on the other."""
-    count = 4
-    scene = dap.Scene(name="hanging")
-    outer = "ground.O"
-    for k in range(count):
-        scene.add_body(f"b{k}", mass=1.0 + k, Jp=(0.1, 0.1, 0.01), r=(0.0, 0.0, -0.5 - k))
-        scene.add_point(f"in{k}", f"b{k}", (0.0, 0.0, 0.5))
-        scene.add_joint("sph", f"J{k}", P_i=f"in{k}", P_j=outer)
-        outer = scene.add_point(f"out{k}", f"b{k}", (0.0, 0.0, -0.5))
-    scene.add_force("weight", "gravity")
-    result = dap.simulate(scene, t_end=0.0)
-    for k in range(count):
-        below = 9.81 * sum(1.0 + b for b in range(k, count))
-        on = result.reaction(f"J{k}")
-        np.testing.assert_allclose(on["i"].force, [[0, 0, below]], rtol=1e-13, atol=1e-12)
-        np.testing.assert_allclose(on["j"].force, [[0, 0, -below]], rtol=1e-13, atol=1e-12)
-        np.testing.assert_allclose(on["j"].moment_at_point, 0, atol=1e-12)
-
-
 def test_shelf_on_an_upright_hinge():
     """A shelf of 3 kg at rest, 0.4 m from its hinge: the hinge bears m g and the moment m g a.
     The shelf is turned by 30 deg about the upright axis: in its own axes all stays as it was."""

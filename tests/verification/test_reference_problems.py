@@ -2,8 +2,6 @@
 Each reference is good to about 1e-11. A tolerance is stated with its reason: at rtol 1e-11 the
 global error of these runs is some 10 to 100 times the tolerance over their length."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from support import problems
@@ -36,12 +34,6 @@ def test_pendulum(t, integrator):
     assert result.rd[-1, 0, :2] == pytest.approx([vx, vy], abs=5e-9)
     # lambda |d| with |d| = 1 m, negative in tension
     assert -result.Lam[-1, 0] * 1.0 == pytest.approx(tension, abs=1e-8)
-
-
-def test_pendulum_tension_throughout():
-    """A01: the tension is -3 m g y at every reported instant (closed form)."""
-    result = dap.simulate(problems.pendulum(), t_end=10.0, dt=0.1, **TIGHT)
-    assert -result.Lam[:, 0] == pytest.approx(-3 * 9.81 * result.r[:, 0, 1], abs=1e-8)
 
 
 G1 = {
@@ -130,23 +122,3 @@ def test_observed_order(problem, integrator):
     coarse, fine = (error(n) for n in steps)
     assert fine > 5e-14, "the error is at rounding: take larger steps"
     assert np.log(coarse / fine) / np.log(steps[1] / steps[0]) == pytest.approx(order, abs=0.2)
-
-
-@pytest.mark.slow
-def test_long_run_keeps_energy_and_constraints():
-    """pen1 over 100 s at rtol 1e-10, projected: energy drift below 1e-8, |C| below 1e-11."""
-    result = dap.simulate("pen1", t_end=100.0, dt=0.02, rtol=1e-10, atol=1e-12, project=True)
-    assert np.max(np.abs(result.energy.total - result.energy.total[0])) < 1e-8
-    assert result.ledger["position"].value < 1e-11
-
-
-@pytest.mark.parametrize("integrator", ["dop853", "dopri5"])
-def test_error_follows_tolerance(integrator):
-    """Tightening rtol by 100 lowers the true error by at least 10 (A01 against its closed form)."""
-
-    def error(rtol):
-        result = last(problems.pendulum(), 1.0, integrator=integrator, rtol=rtol, atol=rtol)
-        return np.linalg.norm(result.r[-1, 0, :2] - A01[1.0][:2])
-
-    errors = [error(rtol) for rtol in (1e-4, 1e-6, 1e-8, 1e-10)]
-    assert all(b < a / 10 for a, b in pairwise(errors)), errors

@@ -112,15 +112,6 @@ def test_a_slider_crank_drawn_straight_is_assembled():
     assert result.r[0, 2, 0] == pytest.approx(2.5, abs=1e-9)
 
 
-def test_an_assembled_chain_runs_on():
-    """Under its weight, in the plane, with its energy kept."""
-    scene = straight((1.0, 1.0, 1.0), 2.5)
-    scene.add_force("weight", "g", wgt=(0.0, -1.0, 0.0))
-    result = dap.simulate(scene, t_end=1.0, dt=0.05)
-    assert result.ledger["total energy"].ok
-    assert result.ledger["position"].ok
-
-
 @pytest.mark.parametrize("joint", ["sph", "rev"])
 @pytest.mark.parametrize(
     ("lengths", "end"),

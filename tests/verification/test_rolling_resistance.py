@@ -254,23 +254,6 @@ def test_a_cart_on_wheels_slows_down_by_what_its_wheels_resist():
     assert all(entry.ok for entry in result.ledger.values())
 
 
-def test_forty_balls_slow_down_as_one():
-    """More than a hundred contacts: sweeps, and Newton's method on each that they leave."""
-    scene, v, mu_roll, a = dap.Scene(name="forty"), 1.0, 0.01, G * 0.01 / (ROLLS * R)
-    for k in range(40):
-        r, turn = [0.0, 0.3 * k, R], [0.0, v / R, 0.0]
-        scene.add_body(f"ball{k}", mass=M, Jp=[I] * 3, r=r, r_dot=[v, 0.0, 0.0], w=turn)
-        scene.add_shape("sphere", body=f"ball{k}", radius=R, collides=True)
-    scene.add_shape("plane", body="ground", collides=True)
-    scene.add_material("felt", mu=0.8, mu_roll=mu_roll, mu_spin=0.002)
-    scene.add_collisions(material="felt")
-    scene.add_force("weight")
-    result = dap.simulate(scene, t_end=0.2, dt=0.1, contact_step=2e-3, rtol=1e-10)
-    assert result.rd[-1, :, 0] == pytest.approx(
-        np.full(40, v - 0.2 * a), abs=1e-9
-    )  # rtol, 100 steps
-
-
 def test_a_heap_comes_to_rest_where_its_balls_resist_rolling():
     """27 balls in a box, with more than a hundred contacts that press on each other."""
     scene, rng, radius = dap.Scene(name="heap"), np.random.default_rng(3), 0.05

@@ -6,7 +6,7 @@ import sys
 import attrs
 import numpy as np
 import pytest
-from support import singular
+from support import redundant
 from support.process import REPOSITORY
 from support.stewart import stewart
 
@@ -74,7 +74,7 @@ def test_lsq_solves_for_a_light_platform_on_heavy_legs():
 def test_radau_leaves_a_pose_that_is_singular_in_two_ways(rtol):
     """Pivots go to zero as the square of the way, and the iteration stalls at rounding behind."""
     result = dap.simulate(
-        singular.dead_centre(), t_end=2.0, dt=0.02, integrator="radau", rtol=rtol, atol=rtol / 100
+        redundant.dead_centre(), t_end=2.0, dt=0.02, integrator="radau", rtol=rtol, atol=rtol / 100
     )
     t = result.t
     x = 3.0 - (1.0 - t) ** 2 / 2.0

@@ -105,12 +105,12 @@ A04 = {
 
 def test_bricard():
     """A04, 30 rows of rank 29 everywhere: e < 1e-6 at the defaults, and 1e-10 at rtol 1e-11."""
-    compiled = dap.compile(redundant.bricard())
+    compiled = dap.compile(dap.load("A04"))
     rank = compiled.redundancy().rank
     assert (rank.rows, rank.rank, rank.dof, compiled.method) == (30, 29, 1, "lsq")
     for limit, settings in ((1e-6, {}), (1e-10, {"rtol": 1e-11, "atol": 1e-13})):
         result = dap.simulate(compiled, t_end=2.0, dt=0.5, **settings)
-        head = list(result.model.point_names).index("head1")
+        head = list(result.model.point_names).index("P3")
         found = result.rP[[1, 2, 4], head]
         assert redundant.error_of(found, np.array(list(A04.values()))) < limit
         assert result.energy.total[0] == pytest.approx(-29.43, abs=1e-12)
@@ -139,9 +139,9 @@ def test_the_implicit_integrator_with_redundant_rows(rtol):
     """A04 by radau: e follows rtol, and steps grow with its fifth root as those of order 5 do, from
     some 20 at 1e-6 on; multipliers of rows that depend on others do not settle, and need not."""
     result = dap.simulate(
-        redundant.bricard(), t_end=2.0, dt=0.5, integrator="radau", rtol=rtol, atol=rtol / 100
+        dap.load("A04"), t_end=2.0, dt=0.5, integrator="radau", rtol=rtol, atol=rtol / 100
     )
-    head = list(result.model.point_names).index("head1")
+    head = list(result.model.point_names).index("P3")
     found = result.rP[[1, 2, 4], head]
     assert redundant.error_of(found, np.array(list(A04.values()))) < max(10 * rtol, 1e-8)
     assert result.stats.steps < 400

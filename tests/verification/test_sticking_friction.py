@@ -42,23 +42,6 @@ def test_a_hinge_stops_and_stays(integrator):
     assert result.work[-1] == pytest.approx(-0.5 * inertia * spin**2, abs=1e-12)
 
 
-def test_a_block_on_a_spring_swings_to_rest():
-    """The Coulomb oscillator: each half swing is 2 F / k shorter, until the spring is too weak."""
-    m, k, F = 2.0, 50.0, 3.0
-    scene = slider(m, 1.0)
-    scene.add_force("tran_sda", "spring", P_i="block.O", P_j="ground.O", a_j="ground.x", k=k)
-    scene.add_force("tran_friction", "rub", joint="way", f_c=F)
-    result = dap.simulate(scene, t_end=8.0, dt=0.25, **TIGHT)
-    swings, x = 0, 1.0
-    while abs(x) > F / k:
-        x = -np.sign(x) * (abs(x) - 2.0 * F / k)
-        swings += 1
-    (stick,) = result.events
-    assert stick.t == pytest.approx(swings * np.pi * np.sqrt(m / k), rel=0, abs=1e-9)
-    assert result.r[-1, 0, 0] == pytest.approx(x, abs=1e-12)
-    assert result.contact("rub").friction[-1, 0] == pytest.approx(k * x, abs=1e-11)
-
-
 def test_a_block_that_is_pulled_sticks_and_slips():
     """By a spring whose end moves at V, with f_s above f_c; d = (f_s - f_c) / k, w^2 = k / m.
 

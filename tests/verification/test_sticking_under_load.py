@@ -75,81 +75,6 @@ def test_a_loaded_pin_stops_its_wheel(integrator):
     assert result.work[-1] == pytest.approx(-0.5 * inertia * 2.0**2, abs=1e-11)
 
 
-@pytest.mark.parametrize("part", [0.99, 1.01])
-def test_a_loaded_hinge_holds_up_to_its_friction(part):
-    scene, moment, inertia = wheel()
-    scene.add_force("motor", "push", joint="pin", torque=part * moment)
-    result = dap.simulate(scene, t_end=10.0, dt=5.0, **TIGHT)
-    angle = result.quantity("pin.angle").values[-1]
-    turned = 0.5 * max(part - 1.0, 0.0) * moment / inertia * 100.0
-    assert angle == pytest.approx(turned, rel=1e-10, abs=1e-14)
-
-
-def test_a_door_with_a_loaded_hinge_strikes_its_limit():
-    """From 4 rad/s to 1 rad by friction, back with e of its speed, and to rest by friction."""
-    scene, moment, inertia = wheel(spin=4.0, upper=1.0, e=0.5)
-    result = dap.simulate(scene, t_end=6.0, dt=0.5, **TIGHT)
-    a = moment / inertia
-    at_limit = np.sqrt(16.0 - 2.0 * a)
-    assert [event.kind for event in result.events] == ["impact", "stick"]
-    ends = (4.0 - at_limit) / a + 0.5 * at_limit / a
-    assert result.events[1].t == pytest.approx(ends, rel=0, abs=1e-9)
-    back = (0.5 * at_limit) ** 2 / (2.0 * a)
-    assert result.quantity("pin.angle").values[-1] == pytest.approx(1.0 - back, abs=1e-11)
-
-
-def test_a_block_on_a_belt_sticks_and_slips():
-    """On a belt at V, held by a spring; d = (mu_s - mu) m g / k, w^2 = k / m.
-
-    It slips for 2 (pi - atan(d w / V)) / w, and sticks while the belt moves on by 2 d.
-    """
-    m, k, V, mu, mu_s = 2.0, 50.0, 0.3, 0.15, 0.25
-    scene = dap.Scene(name="belt")
-    scene.add_body("block", mass=m, Jp=(0.1, 0.1, 0.1), r_dot=(V, 0.0, 0.0))
-    scene.add_body("belt", mass=100.0, r_dot=(V, 0.0, 0.0))
-    scene.add_function("a", "ramp", coeff=(0.0, V, 0.0))
-    along = {"P_j": "ground.O", "a_j": "ground.x"}
-    scene.add_joint("tran", "way", P_i="belt.O", **along)
-    scene.add_joint("drive-tran", "drive", P_i="belt.O", **along, function="ramp")
-    scene.add_joint("tran", "top", P_i="block.O", P_j="belt.O", a_j="belt.x")
-    scene.add_force("weight")
-    scene.add_force("friction", "rub", joint="top", mu=mu, mu_s=mu_s)
-    scene.add_force("tran_sda", "spring", P_i="block.O", **along, k=k)
-    result = dap.simulate(scene, t_end=4.0, dt=0.25, **TIGHT)
-    d, w = (mu_s - mu) * m * G / k, np.sqrt(k / m)
-    slips, sticks = 2.0 * (np.pi - np.arctan(d * w / V)) / w, 2.0 * d / V
-    first = mu_s * m * G / (k * V)
-    expected = [first, first + slips, first + slips + sticks, first + 2.0 * slips + sticks]
-    assert [event.kind for event in result.events][:4] == ["slip", "stick"] * 2
-    instants = [event.t for event in result.events[:4]]
-    assert instants == pytest.approx(expected, rel=0, abs=1e-9)
-    assert abs(result.ledger["energy"].value) < 1e-9
-
-
-@pytest.mark.slow
-def test_an_overhung_shaft_in_two_bearings():
-    """Bearings at 0 and L, the mass c before them: loads m g (1 + c / L) and m g c / L."""
-    m, inertia, spin, c, L, mu, R = 3.0, 0.02, 30.0, 0.1, 0.4, 0.2, 0.01
-    scene = dap.Scene(name="shaft")
-    scene.add_body("shaft", mass=m, Jp=(inertia, 0.1, 0.1), r=(-c, 0, 0), w=(spin, 0.0, 0.0))
-    scene.add_body("sleeve", mass=0.1, r=(L, 0.0, 0.0))
-    scene.add_point("fixed", "shaft", (c, 0.0, 0.0))
-    scene.add_point("floating", "shaft", (c + L, 0.0, 0.0))
-    scene.add_joint("sph", "first", P_i="fixed", P_j="ground.O")
-    scene.add_joint("sph", "second", P_i="floating", P_j="sleeve.O")
-    scene.add_joint("tran", "guide", P_i="sleeve.O", P_j="ground.O", a_j="ground.x")
-    scene.add_force("weight")
-    for name in ("first", "second"):
-        scene.add_force("friction", f"rub_{name}", joint=name, mu=mu, radius=R)
-    stops = inertia * spin / (mu * R * m * G * (1.0 + 2.0 * c / L))
-    result = dap.simulate(scene, t_end=1.2 * stops, dt=0.2 * stops, **TIGHT)
-    assert [event.kind for event in result.events] == ["stick", "stick"]
-    assert result.events[0].t == pytest.approx(stops, rel=0, abs=1e-9)
-    assert np.abs(result.w[-1]).max() < 1e-14  # 30 rad/s has a rounding of 7e-15
-    load = result.contact("rub_second").normal_force
-    assert load[:-2] == pytest.approx(m * G * c / L, rel=1e-9)
-
-
 def test_a_ball_joint_stops_about_any_axis():
     """A ball of inertia J about its centre: w' = -mu R m g / J along w, which keeps its way."""
     m, inertia, mu, R = 2.0, 0.05, 0.3, 0.04
@@ -376,15 +301,6 @@ def test_a_mechanism_comes_to_rest_in_all_its_joints(mu, kind):
         if kind == "friction":
             limit = mu * (1.0 if name == "rub_guide" else 0.02) * rub.normal_force
             assert np.all(np.linalg.norm(rub.friction, axis=-1) <= limit * (1.0 + 1e-9))
-
-
-@pytest.mark.slow
-def test_a_mechanism_that_is_driven_keeps_its_energy():
-    """Loads of four joints that depend on each other: what is lost is what friction took."""
-    scene = slider_crank(5.0, 0.3)
-    result = dap.simulate(scene, t_end=1.0, dt=0.1, **TIGHT)
-    assert np.linalg.norm(result.w[-1, 0]) > 5.0
-    assert abs(result.ledger["energy"].value) < 1e-9
 
 
 @pytest.mark.slow

@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 from support import loops, trees
-from support.derived_types import from_C_alone
-from support.own_types import registry_of
 from support.process import REPOSITORY
 from unit.formulations.joint_loops.test_equations import differences
 
@@ -19,7 +17,6 @@ ACCELERATIONS, MULTIPLIERS = 1e-11, 1e-10
 #: First seeds of the trees, twenty from each.
 SEEDS = [0, *(pytest.param(k, marks=pytest.mark.long) for k in range(20, 200, 20))]
 EXAMPLES = sorted((REPOSITORY / "plugins/dap3d-example/scenes").glob("*.toml"))
-DERIVED = ("rev", "sph", "cyl", "tran", "univ")
 
 
 @pytest.mark.parametrize("first", SEEDS)
@@ -52,21 +49,6 @@ def test_types_of_the_example_package_move_as_in_other_methods(scene):
     """Screws, gears of three bodies, points on planes and surfaces: ten times the tolerance."""
     settings = {"t_end": 0.2, "dt": 0.05, "rtol": 1e-9, "atol": 1e-11, "integrator": "dop853"}
     same_motion(dap.load(scene), dap.load(scene), settings)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_types_by_C_alone_move_as_the_standard_ones(seed):
-    """A random tree with a loop; the types have no J and gamma of their own, and other names."""
-    pytest.importorskip("sympy")
-    registry = dap.load_registry()
-    own = [from_C_alone(registry.get("joint", name).type, f"own-{name}") for name in DERIVED]
-    usual, other = (
-        loops.add_loops(trees.random_tree(6, seed), seed, 1, ("sph",)) for _ in range(2)
-    )
-    for joint in other.joints.values():
-        joint.type = f"own-{joint.type}"
-    settings = {"t_end": 0.3, "dt": 0.1, "rtol": 1e-9, "atol": 1e-11}
-    same_motion(usual, other, settings, registry_of(*own))
 
 
 def same_motion(usual, other, settings, registry=None):

@@ -30,28 +30,6 @@ def test_long_chains_have_the_accelerations_of_standard(n):
     assert multipliers < n * 1e-13
 
 
-#: Settings of the same error; of adams it is some ten times that of one-step methods.
-CONTROLS = {
-    "dopri5": {"rtol": 1e-9, "atol": 1e-11},
-    "dop853": {"rtol": 1e-9, "atol": 1e-11},
-    "adams": {"rtol": 1e-10, "atol": 1e-12},
-    "rk4": {"step": 2e-4},
-}
-
-
-@pytest.mark.parametrize(("integrator", "control"), CONTROLS.items())
-def test_every_explicit_integrator_gives_the_motion_of_standard(integrator, control):
-    """Ten times the tolerance over a second of tumbling; rk4 by a step of the same error."""
-    scene = trees.random_tree(7, 4, free=0.2)
-    settings = {"t_end": 1.0, "dt": 0.1, "integrator": integrator, **control}
-    right = dap.simulate(scene, method="standard", **settings)
-    found = dap.simulate(scene, method="joint", **settings)
-    size = np.max(np.abs(right.u))
-    assert found.u == pytest.approx(right.u, abs=1e-8 * size)
-    assert found.Lam == pytest.approx(right.Lam, abs=1e-7 * np.max(np.abs(right.Lam)))
-    assert all(entry.ok for entry in found.ledger.values())
-
-
 def test_energy_is_kept_over_five_minutes():
     """A pendulum of three rods: drift per second as little as the tolerance, and no row opens."""
     found = dap.simulate(trees.mixed_chain(3), t_end=300.0, dt=10.0, rtol=1e-10, method="joint")

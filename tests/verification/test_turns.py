@@ -53,16 +53,6 @@ def test_a_file_of_an_older_program_has_no_turns_and_says_so(tmp_path):
     assert sum("holds no turns" in note for note in read.notes) == 1
 
 
-def test_the_points_of_a_sweep_keep_their_turns():
-    def moment(result):
-        return float(result.force("spring").on["i"].moment[-1, 2])
-
-    stiffness = np.array([0.5, 1.0, 1.5, 2.0])
-    found = dap.sweep(winding(), {"forces.spring.k": stiffness}, outputs={"last": moment})
-    w = np.sqrt(stiffness)
-    np.testing.assert_allclose(found["last"], -SPEED * w * np.sin(3.0 * w), atol=1e-3)
-
-
 @pytest.mark.parametrize("rtol", [1e-3, 1e-4])
 def test_long_steps_do_not_lose_turns(rtol):
     """At loose tolerances a step turns the wheel by more than half a turn.

@@ -301,22 +301,6 @@ def test_a_leg_is_not_drawn_through_its_end():
 # ---------------------------------------------------------------------------- what wheels carry
 
 
-def test_couples_transmit_moments_alone():
-    """An idler between two fixed wheels: no force in its bearing, which describe says."""
-    scene = dap.Scene(name="idler")
-    for n, x in (("a", 0.0), ("b", 0.1), ("c", 0.2)):
-        scene.add_body(n, mass=1.0, Jp=(1e-3,) * 3, r=(x, 0.0, 0.0))
-        scene.add_point(f"g{n}", "ground", (x, 0.0, 0.0))
-        scene.add_joint("rev", f"B{n}", P_i=f"{n}.O", P_j=f"g{n}", a_i=f"{n}.z", a_j="ground.z")
-    for i, j in ("ab", "bc"):
-        scene.add_joint("couple", i + j, a_i=f"{i}.z", a_j=f"{j}.z", teeth_i=20, teeth_j=20)
-    scene.add_force("n", "in", body_i="a", n=(0.0, 0.0, 10.0))
-    scene.add_force("n", "out", body_i="c", n=(0.0, 0.0, -10.0))
-    result = dap.simulate(scene, t_end=0.1)
-    assert result.quantity("Bb.force.norm").values == pytest.approx(0.0, abs=1e-9)
-    assert result.reaction("ab")["i"].moment[:, 2] == pytest.approx(-10.0, abs=1e-9)
-
-
 @pytest.mark.parametrize("type_", ["couple", "follow"])
 def test_describe_says_what_bearings_of_wheels_carry(type_):
     """In its first lines: moments alone, and nothing of the tooth force."""

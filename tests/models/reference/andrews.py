@@ -101,14 +101,6 @@ def trajectory() -> Trajectory:
     return Trajectory(lambda _, y: np.concatenate([y[7:], second(y[:7], y[7:])]), y0)
 
 
-def energy(angles: Array, speeds: Array) -> tuple[float, float]:
-    """Return the kinetic energy and that of the spring."""
-    kinetic = 0.5 * float(np.array(INERTIA) @ speeds**2)
-    for k in range(7):
-        kinetic += 0.5 * MASS[k] * abs(rates(CENTRES[k], angles) @ speeds) ** 2
-    return kinetic, 0.5 * STIFFNESS * (abs(C - place(D, angles)) - LENGTH) ** 2
-
-
 def flat(x: complex) -> tuple[float, float, float]:
     """Return a complex number as a vector in the plane."""
     return (float(np.real(x)), float(np.imag(x)), 0.0)
@@ -116,8 +108,7 @@ def flat(x: complex) -> tuple[float, float, float]:
 
 def quantities(t: float) -> dict[str, Array]:
     """Return every quantity that `expected.toml` may name, at `t`.
-    The reactions are those that Newton's law needs for this motion: 41 unknowns, 42 equations, of
-    which "imbalance" is the residual."""
+    The reactions are those that Newton's law needs for this motion: 41 unknowns, 42 equations."""
     y = trajectory().at(t)
     angles, speeds = y[:7], y[7:]
     turning = second(angles, speeds)
@@ -130,9 +121,6 @@ def quantities(t: float) -> dict[str, Array]:
         v[k, :3] = flat(by_angle @ speeds)
         v_dot[k, :3] = flat(by_angle @ turning + centripetal(centre, angles, speeds))
     out = SYSTEM.counts | SYSTEM.quantities(r, p, v.ravel(), v_dot.ravel())
-    kinetic, potential = energy(angles, speeds)
-    out["energy.total"] = np.array([kinetic + potential])
-    out["worked"] = np.array([TORQUE * (angles[0] - BETA)])
     for name, point in (("F1", F), ("E3", E[1]), ("D", D)):
         out[f"rP.{name}"] = np.array(flat(place(point, angles)))
         out[f"rPd.{name}"] = np.array(flat(rates(point, angles) @ speeds))

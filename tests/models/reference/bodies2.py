@@ -1,7 +1,5 @@
 """Reference for the model `bodies2`: two free bodies, two spring-dampers, weight.
-Two derivations. `quaternions` integrates Newton-Euler with Euler parameters and the global angular
-velocity; `momenta` integrates rotation matrices and the angular momenta, so it uses neither
-quaternions nor Euler's equations. They agree to the digits of the `bodies2` checks."""
+Newton-Euler with Euler parameters and the global angular velocity."""
 
 from functools import cache
 
@@ -19,23 +17,23 @@ C_LOCAL = np.array([0.0, -0.6, 0.0])  # on the lower body
 K, DAMPING, LENGTHS = 100.0, 2.0, (1.5, 1.0)
 
 
-def loads(r: Array, A: Array, v: Array, w: Array) -> tuple[Array, Array, float, float]:
-    """Return forces, moments about the mass centres, potential energy and dissipated power."""
+def loads(r: Array, A: Array, v: Array, w: Array) -> tuple[Array, Array, float]:
+    """Return forces, moments about the mass centres and potential energy."""
     a, b, c = A[0] @ A_LOCAL, A[0] @ B_LOCAL, A[1] @ C_LOCAL
     a_dot, b_dot = v[0] + cross(w[0], a), v[0] + cross(w[0], b)
     c_dot = v[1] + cross(w[1], c)
-    F1, V1, P1 = spring(r[0] + a, a_dot, Q, np.zeros(3), K, DAMPING, LENGTHS[0])
-    F2, V2, P2 = spring(r[0] + b, b_dot, r[1] + c, c_dot, K, DAMPING, LENGTHS[1])
+    F1, V1 = spring(r[0] + a, a_dot, Q, np.zeros(3), K, DAMPING, LENGTHS[0])
+    F2, V2 = spring(r[0] + b, b_dot, r[1] + c, c_dot, K, DAMPING, LENGTHS[1])
     weight = [-m * GRAVITY * Z for m in MASS]
     force = np.array([F1 + F2 + weight[0], -F2 + weight[1]])
     moment = np.array([cross(a, F1) + cross(b, F2), -cross(c, F2)])
     potential = V1 + V2 + sum(m * GRAVITY * x[2] for m, x in zip(MASS, r, strict=True))
-    return force, moment, potential, P1 + P2
+    return force, moment, potential
 
 
 def accelerations(r: Array, A: Array, v: Array, w: Array) -> tuple[Array, Array]:
     """Return the accelerations of the mass centres and the angular accelerations, global axes."""
-    force, moment, _, _ = loads(r, A, v, w)
+    force, moment, _ = loads(r, A, v, w)
     J = [A[i] @ JP[i] @ A[i].T for i in (0, 1)]
     w_dot = [np.linalg.solve(J[i], moment[i] - cross(w[i], J[i] @ w[i])) for i in (0, 1)]
     return force / np.array(MASS)[:, None], np.array(w_dot)
@@ -49,40 +47,17 @@ def unpack(y: Array) -> tuple[Array, Array, Array, Array]:
 
 @cache
 def quaternions(rtol: float = 1e-13, atol: float = 1e-15) -> Trajectory:
-    """Return the motion of (r, p, v, w, dissipated energy)."""
+    """Return the motion of (r, p, v, w)."""
 
     def rhs(_: float, y: Array) -> Array:
         r, p, v, w = unpack(y)
         A = np.array([rotation(x) for x in p])
         v_dot, w_dot = accelerations(r, A, v, w)
         p_dot = [quaternion_rate(p[i], w[i]) for i in (0, 1)]
-        power = loads(r, A, v, w)[3]
-        return np.concatenate([v.ravel(), np.ravel(p_dot), v_dot.ravel(), w_dot.ravel(), [power]])
+        return np.concatenate([v.ravel(), np.ravel(p_dot), v_dot.ravel(), w_dot.ravel()])
 
     unit = [1.0, 0.0, 0.0, 0.0]
-    return Trajectory(rhs, np.concatenate([*R0, unit, unit, np.zeros(13)]), rtol, atol)
-
-
-def unpack_momenta(y: Array) -> tuple[Array, Array, Array, Array]:
-    """Return r, A, v and w, one entry a body, of the state of `momenta`."""
-    r, A = y[0:6].reshape(2, 3), y[6:24].reshape(2, 3, 3)
-    v, h = y[24:30].reshape(2, 3), y[30:36].reshape(2, 3)
-    return r, A, v, np.array([A[i] @ np.linalg.solve(JP[i], A[i].T @ h[i]) for i in (0, 1)])
-
-
-@cache
-def momenta() -> Trajectory:
-    """Return the motion of (r, A, v, angular momentum): the second derivation."""
-
-    def rhs(_: float, y: Array) -> Array:
-        r, A, v, w = unpack_momenta(y)
-        force, moment, _, _ = loads(r, A, v, w)
-        A_dot = [cross(w[i], A[i]) for i in (0, 1)]
-        v_dot = force / np.array(MASS)[:, None]
-        return np.concatenate([v.ravel(), np.ravel(A_dot), v_dot.ravel(), moment.ravel()])
-
-    unit = np.eye(3).ravel()
-    return Trajectory(rhs, np.concatenate([*R0, unit, unit, np.zeros(12)]))
+    return Trajectory(rhs, np.concatenate([*R0, unit, unit, np.zeros(12)]), rtol, atol)
 
 
 def quantities(t: float) -> dict[str, Array]:
@@ -102,7 +77,6 @@ def quantities(t: float) -> dict[str, Array]:
         "energy.kinetic": np.array([kinetic]),
         "energy.potential": np.array([potential]),
         "energy.total": np.array([kinetic + potential]),
-        "dissipated": y[26:27],
     }
     for i, name in enumerate(NAMES):
         out |= {f"r.{name}": r[i], f"p.{name}": p[i], f"rd.{name}": v[i], f"w.{name}": w[i]}

@@ -6,7 +6,7 @@ fourth and sixth by b, and the loop closes where
 
     f(a, b) = sin(b) - sin(a) - sin(a) sin(b) = 0
 
-("gap" is what is left of it in the last joint). Virtual power along f = 0 gives the accelerations.
+Virtual power along f = 0 gives the accelerations.
 One of the 30 rows is redundant, so some reactions are open. `simulated` integrates the whole
 mechanism once more in the generic simulator `kkt`, which knows nothing of the symmetry.
 """
@@ -28,7 +28,7 @@ JP = [np.where(np.diff(NODES, axis=0)[k] != 0, ALONG, ACROSS) for k in range(5)]
 
 
 def motion(angles: Array, speeds: Array, turning: Array) -> tuple[Array, ...]:
-    """Return r, p, (v, w) and (v_dot, w_dot) of the five rods, and the pose of the fifth's end.
+    """Return r, p, (v, w) and (v_dot, w_dot) of the five rods.
     `angles`, `speeds` and `turning` are a, b and their derivatives."""
     by_joint = [TURNS @ x for x in (angles, speeds, turning)]
     tip, tip_dot, tip_ddot, w, w_dot = (np.zeros(3) for _ in range(5))
@@ -45,7 +45,7 @@ def motion(angles: Array, speeds: Array, turning: Array) -> tuple[Array, ...]:
         parts.append((tip + rod / 2, p, rates, np.concatenate([tip_ddot + rod_ddot / 2, w_dot])))
         tip, tip_dot, tip_ddot = tip + rod, tip_dot + rod_dot, tip_ddot + rod_ddot
     r, poses, v, v_dot = (np.array(x) for x in zip(*parts, strict=True))
-    return r, poses, v, v_dot, tip, rotation(p) @ AXES[5]
+    return r, poses, v, v_dot
 
 
 def second(angles: Array, speeds: Array) -> Array:
@@ -56,7 +56,7 @@ def second(angles: Array, speeds: Array) -> Array:
     base = -slope * (speeds @ bend @ speeds) / (slope @ slope)
     way = np.array([slope[1], -slope[0]])
     along = motion(angles, way, np.zeros(2))[2]
-    _, p, v, rest, _, _ = motion(angles, speeds, base)
+    _, p, v, rest = motion(angles, speeds, base)
     inertia, power = 0.0, 0.0
     for k in range(5):
         A = rotation(p[k])
@@ -98,11 +98,11 @@ SYSTEM = system()
 def quantities(t: float) -> dict[str, Array]:
     """Return every quantity that `expected.toml` may name, at `t`."""
     y = trajectory().at(t)
-    r, p, v, v_dot, tip, axis = motion(y[:2], y[2:], second(y[:2], y[2:]))
+    r, p, v, v_dot = motion(y[:2], y[2:], second(y[:2], y[2:]))
     out = SYSTEM.counts | SYSTEM.quantities(r, p, v.ravel(), v_dot.ravel())
     end = rotation(p[1]) @ (NODES[2] - NODES[1]) / 2  # rod 2 reaches from node 1 to P3
     out |= {"rP.P3": r[1] + end, "rPd.P3": v[1, :3] + cross(v[1, 3:], end)}
-    return out | {"gap": np.concatenate([tip - NODES[5], axis - AXES[5]]), "angles": y[:2]}
+    return out
 
 
 #: The quantities once more, from the generic simulator.

@@ -4,11 +4,10 @@ ground) relative to i (the crank), so the crank turns backwards. T is the crank 
 B = O + 7 e(phi), e = cos(phi) z + sin(phi) u, the follower tip. The loop closes at |B - T| = 6.4,
 linear in (cos phi, sin phi). Velocities and accelerations follow by differentiating it."""
 
-from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from rigid import Array, Trajectory, Z, quaternion_rate, rotation, turn
+from rigid import Array, Trajectory, Z, quaternion_rate, turn
 
 CRANK, COUPLER, FOLLOWER = 2.0, 6.4, 7.0
 RATE = 2 * np.pi  # f_dot of the driver; the crank turns at -RATE
@@ -100,23 +99,3 @@ def coupler(t: float) -> tuple[Array, Array, Array, Array]:
 
 
 SPRING_K, SPRING_LENGTH = 50.0, 8.0  # follower tip to the origin
-
-
-def driver_moment(
-    t: float,
-    inertias: Sequence[tuple[float, tuple[float, float, float]]],
-    parts: Sequence[Callable[[float], tuple[Array, Array, Array, Array]]],
-) -> float:
-    """Return the moment of the driver on the crank about x [N m], without any Jacobian.
-    The driver is all that does work from outside, so its power is the rate of the kinetic and the
-    spring energy. `inertias` holds mass and principal inertias of each body, `parts` its motion."""
-    power = 0.0
-    for (mass, Jp), part in zip(inertias, parts, strict=True):
-        _, p, v, v_dot = part(t)
-        A = rotation(p)
-        power += mass * v[:3] @ v_dot[:3] + (A.T @ v[3:]) @ (np.array(Jp) * (A.T @ v_dot[3:]))
-    tip, tip_dot, _ = (FOLLOWER * x for x in follower_axis(t))
-    d = PIVOT + tip
-    length = np.linalg.norm(d)
-    power += SPRING_K * (length - SPRING_LENGTH) * (d @ tip_dot) / length
-    return power / -RATE

@@ -42,11 +42,5 @@ def quantities(t: float) -> dict[str, Array]:
     return SYSTEM.counts | SYSTEM.quantities(r, p, v.ravel(), v_dot.ravel())
 
 
-def driver_moment(t: float) -> float:
-    """Return the moment of the driver on the crank about x [N m] from the power balance."""
-    parts = (fourbar.crank, fourbar.follower)
-    return fourbar.driver_moment(t, [(b.mass, b.Jp) for b in SYSTEM.bodies], parts)
-
-
 #: The quantities once more, from the generic simulator.
 simulated = SYSTEM.simulator()

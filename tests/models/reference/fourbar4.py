@@ -1,15 +1,14 @@
 """Reference for the model `fourbar4`: that of `fourbar3` with its ground link as a fourth body.
 The link stays at rest, so the motion is that of `fourbar`, in closed form; the reactions are those
-that Newton's law needs for it (23 unknowns, 24 equations, residual checked). What the fixing joint
-carries is found once more in `held` from the balance of the whole mechanism, without any Jacobian.
-`simulated` integrates the same system with the generic simulator `kkt`."""
+that Newton's law needs for it (23 unknowns, 24 equations). `simulated` integrates the same system
+with the generic simulator `kkt`."""
 
 import fourbar
 import fourbar3
 import numpy as np
 from kkt import Body, Driver, Fixed, Spring, System, rev, sph
 from kkt_joints import fix
-from rigid import Array, cross
+from rigid import Array
 
 CRANK, COUPLER, FOLLOWER, LINK = 0, 1, 2, 3
 PLACE = (0.0, 2.0, 0.0)
@@ -43,25 +42,6 @@ def quantities(t: float) -> dict[str, Array]:
     """Return every quantity that `expected.toml` may name, at `t`."""
     r, p, v, v_dot = (np.array(x) for x in zip(*(part(t) for part in PARTS), strict=True))
     return SYSTEM.counts | SYSTEM.quantities(r, p, v.ravel(), v_dot.ravel())
-
-
-def driver_moment(t: float) -> float:
-    """Return the moment of the driver on the crank about x [N m] from the power balance."""
-    return fourbar.driver_moment(t, [(b.mass, b.Jp) for b in SYSTEM.bodies], PARTS)
-
-
-def held(t: float) -> Array:
-    """Return what the fixing joint exerts on the link: force, moment about its mass centre.
-    Nothing else acts from outside, so it is the rate of the momentum of the moving bodies."""
-    force, moment = np.zeros(3), np.zeros(3)
-    for body, part in zip(SYSTEM.bodies, PARTS, strict=True):
-        r, p, v, v_dot = part(t)
-        A = fourbar.rotation(p)
-        J = A @ np.diag(body.Jp) @ A.T
-        force += body.mass * v_dot[:3]
-        moment += cross(r - np.array(PLACE), body.mass * v_dot[:3])
-        moment += J @ v_dot[3:] + cross(v[3:], J @ v[3:])
-    return np.concatenate([force, moment])
 
 
 #: The quantities once more, from the generic simulator.

@@ -7,14 +7,14 @@ With phi the angle of the cranks from the upright, clockwise, the row has the ki
 
 which elliptic functions solve: phi = pi + 2 am(q t - K, m), q^2 = w^2 + 1/4, m = w^2 / q^2.
 Redundant joints leave some reactions open; those given are of least norm, their components in the
-plane are unique (but where all links are in line). `pendulum` integrates phi once more.
+plane are unique (but where all links are in line).
 """
 
 from functools import cache
 
 import numpy as np
 from kkt import GROUND, Body, Fixed, Joint, System, rev
-from rigid import GRAVITY, Array, Trajectory, Z, turn
+from rigid import GRAVITY, Array, Z, turn
 from scipy.special import ellipj, ellipk
 
 ACROSS, ALONG = 1 / 12, 1e-3
@@ -36,15 +36,6 @@ class Row:
         _, _, dn, am = ellipj(self.q * t - ellipk(self.m), self.m)
         phi = np.pi + 2 * am
         return phi, 2 * self.q * dn, self.w2 * np.sin(phi)
-
-    def pendulum(self, t: float) -> tuple[float, float]:
-        """Return phi and phi_dot once more, by integration."""
-
-        def rhs(_: float, y: Array) -> Array:
-            return np.array([y[1], self.w2 * np.sin(y[0])])
-
-        phi, rate = Trajectory(rhs, np.array([0.0, 1.0])).at(t)
-        return phi, rate
 
     def system(self) -> System:
         """Return the row in space, at the start."""

@@ -238,7 +238,7 @@ class System:
         for element in self.springs:
             tail, head = motion.point(element.tail), motion.point(element.head)
             ends = [x[:, 0] for x in (tail.f0, tail.f1, head.f0, head.f1)]
-            F, energy, _ = spring(*ends, element.k, element.c, element.length)
+            F, energy = spring(*ends, element.k, element.c, element.length)
             potential += energy
             for end, sign in ((element.tail, 1.0), (element.head, -1.0)):
                 if end.body != GROUND:
@@ -260,26 +260,24 @@ class System:
             x = np.linalg.solve(K, right)
         return x[: 6 * self.n], x[6 * self.n :]
 
-    def corrected(self) -> tuple[Array, Array, Array, list[float]]:
-        """Return the start with both minimum-norm corrections, and max |C| before each pass."""
+    def corrected(self) -> tuple[Array, Array, Array]:
+        """Return the start with both minimum-norm corrections."""
         r, p, v = self.start()
-        history = []
         for _ in range(25):
             A = np.array([rotation(x) for x in p])
             C, D, nu, _ = self.constraints(r, A, v)
-            history.append(float(np.abs(C).max()))
-            if history[-1] <= 1e-10:
+            if np.abs(C).max() <= 1e-10:
                 break
             dz = -np.linalg.lstsq(D[: len(C)], C, rcond=1e-10)[0].reshape(self.n, 6)
             r = r + dz[:, :3]
             p = np.array([x + quaternion_rate(x, d[3:]) for x, d in zip(p, dz, strict=True)])
             p /= np.linalg.norm(p, axis=1)[:, None]
-        return r, p, v - np.linalg.lstsq(D, D @ v - nu, rcond=1e-10)[0], history
+        return r, p, v - np.linalg.lstsq(D, D @ v - nu, rcond=1e-10)[0]
 
     @cached_property
     def counts(self) -> dict[str, Array]:
         """Return rows, rank and degrees of freedom at the corrected start."""
-        r, p, v, _ = self.corrected()
+        r, p, v = self.corrected()
         D = self.constraints(r, np.array([rotation(x) for x in p]), v)[1]
         rank = np.linalg.matrix_rank(D, rtol=1e-11)
         return {
@@ -290,7 +288,7 @@ class System:
 
     def trajectory(self, rtol: float = 1e-13, atol: float = 1e-15) -> Trajectory:
         """Return the motion of (r, p, r_dot, w in body axes) from the corrected start."""
-        r, p, v, _ = self.corrected()
+        r, p, v = self.corrected()
 
         def rhs(_: float, y: Array) -> Array:
             r, p, v = self.unpack(y)
@@ -332,10 +330,10 @@ class System:
     ) -> dict[str, Array]:
         """Return every quantity that `expected.toml` may name.
         With `v_dot` given, the multipliers are those that these accelerations need; they must be
-        unique, and the residual of that balance is "imbalance"."""
+        unique."""
         A = np.array([rotation(x) for x in p])
         M, (g, potential) = self.mass_matrix(A), self.loads(r, A, v)
-        C, D, nu, _ = self.constraints(r, A, v)
+        D = self.constraints(r, A, v)[1]
         if v_dot is None:
             v_dot, lam = self.solve(r, A, v)
         else:
@@ -346,8 +344,6 @@ class System:
             "energy.kinetic": np.array([v @ M @ v / 2]),
             "energy.potential": np.array([potential]),
             "energy.total": np.array([v @ M @ v / 2 + potential]),
-            "imbalance": np.array([np.abs(D.T @ lam - M @ v_dot + g).max()]),
-            "violation": np.array([np.abs(C).max(), np.abs(D @ v - nu).max()]),
         }
         for i, body in enumerate(self.bodies):
             rate, acceleration = v[6 * i : 6 * i + 6], v_dot[6 * i : 6 * i + 6]

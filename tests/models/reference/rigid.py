@@ -57,14 +57,14 @@ def turn(axis: Array, angle: float) -> Array:
 
 def spring(
     tail: Array, tail_dot: Array, head: Array, head_dot: Array, k: float, c: float, length: float
-) -> tuple[Array, float, float]:
-    """Return force on the tail [N], potential energy [J] and dissipated power [W] of a spring."""
+) -> tuple[Array, float]:
+    """Return force on the tail [N] and potential energy [J] of a spring."""
     d, d_dot = head - tail, head_dot - tail_dot
     now = np.linalg.norm(d)
     u = d / now
     rate = u @ d_dot
     stretch = now - length
-    return (k * stretch + c * rate) * u, 0.5 * k * stretch**2, c * rate**2
+    return (k * stretch + c * rate) * u, 0.5 * k * stretch**2
 
 
 class Trajectory:

@@ -1,8 +1,8 @@
 """Reference for the model `N1`, a disk that rolls in a steady circle: closed form.
 The disk leans by b towards the middle of the circle; it spins about its normal and the whole turns
 about the vertical at -(r / R) spin, so that the contact does not slip. The contact force follows
-from the acceleration of the centre; Euler's equation about it fixes the spin ("imbalance" is its
-residual). `simulated` integrates the disk in the generic simulator `kkt`."""
+from the acceleration of the centre; Euler's equation about it fixes the spin.
+`simulated` integrates the disk in the generic simulator `kkt`."""
 
 import numpy as np
 from kkt import Body, System

@@ -8,8 +8,7 @@ speed u of the front wheel over the ground decides all velocities:
 
 with 0.7 m from the rear axle to the steering axis. Virtual power along u gives its rate. Nothing
 turns the rear wheels about their axles, which slip forwards. The loads of the wheels are those that
-Newton's law needs for this motion: 27 unknowns, 30 equations, of which "imbalance" is the residual
-and "violation" that of the joints. `loads` has the start once more, by moments about the axles.
+Newton's law needs for this motion: 27 unknowns, 30 equations.
 """
 
 from functools import cache
@@ -17,7 +16,7 @@ from functools import cache
 import numpy as np
 from kkt import Body, Driver, Fixed, Joint, Moment, System, rev
 from kkt_joints import disk
-from rigid import GRAVITY, Array, Trajectory, Z, product, rotation, turn
+from rigid import Array, Trajectory, Z, product, rotation, turn
 
 NAMES = ("frame", "fork", "front", "left", "right")
 MASS = (20.0, 2.0, 1.0, 1.0, 1.0)
@@ -115,17 +114,6 @@ def motion(t: float) -> tuple[Array, Array, Array, Array]:
         parts.append((r, p, np.concatenate([v, w]), np.concatenate([v_dot, w_dot])))
     r, p, v, v_dot = (np.array(x) for x in zip(*parts, strict=True))
     return r, p, v, v_dot
-
-
-def loads(u_dot: float) -> tuple[float, float]:
-    """Return the load of the front wheel and of each rear wheel at the start, where nothing turns.
-    Moments about the ground under the rear axle, in the plane of symmetry: of the torque, the
-    weights, the accelerated masses and of what speeds the front wheel up about its axle."""
-    turning = JP[2][1] * u_dot / RADIUS - TORQUE
-    for m, (x, _), z in zip(MASS, PLACE, HEIGHT, strict=True):
-        turning += m * (u_dot * z - GRAVITY * (x + BEHIND))
-    front = -turning / BASE
-    return front, (sum(MASS) * GRAVITY - front) / 2
 
 
 def system(rate: float = 0.0, torque: tuple[float, float, float] = (0.0, TORQUE, 0.0)) -> System:

@@ -185,55 +185,6 @@ def test_layout_of_the_rates(name, length, machines):
     assert close(np.hstack([a, w_dot]), report, 1e-11)  # rounding of p, times the condition
 
 
-def in_other_axes(turns):
-    """pen2 with a spring and a damper, its bodies described in axes turned by these matrices."""
-    rod, cylinder = turns
-    scene = dap.Scene(name="turned")
-    for name, R, mass, moments, y in [
-        ("rod", rod, 0.5, (0.3, 0.2, 0.45), 0.5),
-        ("cylinder", cylinder, 10.0, (0.2333, 0.2, 0.3), 1.3),
-    ]:
-        scene.add_body(name, mass=mass, Jp=R.T @ np.diag(moments) @ R, r=(0, y, 0), p=euler(R))
-
-    def spot(name, body, where, R):
-        return scene.add_point(name, body, R.T @ np.array(where, dtype=float))
-
-    spot("inner", "rod", (0, -0.5, 0), rod)
-    spot("outer", "rod", (0, 0.5, 0), rod)
-    spot("face", "cylinder", (0, -0.3, 0), cylinder)
-    spot("rim", "cylinder", (0.2, 0.2, 0), cylinder)
-    scene.add_vector("a_rod", "rod", rod.T @ np.array([0.0, 1.0, 0.0]))
-    scene.add_vector("a_cyl", "cylinder", cylinder.T @ np.array([0.0, 1.0, 0.0]))
-    scene.add_point("hook", "ground", (0.5, 1.0, 1.0))
-    scene.add_joint("sph", "J1", P_i="inner", P_j="ground.O")
-    scene.add_joint("rev", "J2", P_i="face", P_j="outer", a_i="a_cyl", a_j="a_rod")
-    scene.add_force("weight", "gravity")
-    scene.add_force("ptp", "spring", P_i="rim", P_j="hook", k=30.0, c=4.0, l0=0.5)
-    return scene
-
-
-def euler(A):
-    """Euler parameters of a rotation matrix with a positive first one."""
-    e0 = 0.5 * np.sqrt(1.0 + np.trace(A))
-    return np.array([e0, *(A[[2, 0, 1], [1, 2, 0]] - A[[1, 2, 0], [2, 0, 1]]) / (4.0 * e0)])
-
-
-def test_accelerations_do_not_depend_on_the_axes_of_a_body():
-    """The same mechanism described in other body axes, where J' is a full matrix, moves alike: so
-    the factor of J' stands in the right places (condition of J' about 3, some roundings)."""
-    rng = np.random.default_rng(12)
-    turns = [rotation([1.5, *rng.uniform(-1, 1, 3)]) for _ in range(2)]
-    plain, turned = evaluator_of(in_other_axes([np.eye(3)] * 2)), evaluator_of(in_other_axes(turns))
-    assert np.max(np.abs(turned.model.Jp - plain.model.Jp)) > 0.01
-    v = rng.normal(size=12)
-    found = []
-    for evaluator in (plain, turned):
-        u = np.concatenate([evaluator.model.u0[:14], v])
-        found.append(evaluator.report(0.0, u))
-    assert close(found[1][:12], found[0][:12], 1e-12)
-    assert found[1][20:23] == pytest.approx(found[0][20:23], rel=1e-11)  # potential, |C|, |D v|
-
-
 def power_and_rate(evaluator, t, u):
     """Power that the formulation reports, and dT/dt from the accelerations by their definition."""
     model = evaluator.model
@@ -245,16 +196,6 @@ def power_and_rate(evaluator, t, u):
     spin, spin_rate = to_body(p, w), to_body(p, w_dot)
     rate = np.sum(model.mass[:, None] * v * a) + np.einsum("bi,bij,bj", spin, model.Jp, spin_rate)
     return out[-1], rate
-
-
-@seeds
-def test_power_of_forces_on_free_bodies_is_the_rate_of_kinetic_energy(seed):
-    """Springs, dampers and weight on bodies without joints: dT/dt = sum of F . v + n . omega, at
-    any state; the gyroscopic moment does no work. Rounding of sums of some hundred watts."""
-    evaluator = evaluator_of(dap.load("bodies2"))
-    assert evaluator.method == "unconstrained"
-    power, rate = power_and_rate(evaluator, 0.0, Motion(2, np.random.default_rng(seed)).u(0.1))
-    assert power == pytest.approx(rate, rel=1e-12)
 
 
 @pytest.mark.parametrize("name", ["pen2", "fourbar2", "fourbar3"])

@@ -2,20 +2,20 @@
 
 import pytest
 from support.internals import COORDINATE, QUANTITIES, specs_of
-from support.state_types import Lag, Maxwell
+from support.state_types import Lag, Steered
 
 from dap3d_core.interface import Body, Force, PluginError, body, examine, number
 
 
 def test_states_bring_the_fields_of_their_initial_values_and_tolerances():
     """z_0 and z_atol, zero by default, with the shape of the state; names or a table."""
-    specs = specs_of(Maxwell)
+    specs = specs_of(Steered)
     assert (specs["z_0"].kind, specs["z_0"].default) == ("number", 0.0)
     assert (specs["z_atol"].kind, specs["z_atol"].default, specs["z_atol"].minimum) == (
         "number", 0.0, 0.0)  # fmt: skip
     assert (specs_of(Lag)["held_0"].kind, specs_of(Lag)["held_0"].default) == ("vec3", (0.0,) * 3)
     assert Lag.state_lengths() == {"held": 3, "clock": 1}
-    assert Maxwell.state_lengths() == {"z": 1}
+    assert Steered.state_lengths() == {"z": 1}
 
 
 def test_a_type_may_declare_these_fields_itself():

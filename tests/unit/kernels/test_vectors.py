@@ -209,16 +209,6 @@ def test_complex_step_of_atan2_is_its_derivative_in_all_quadrants(y, x):
     assert along_x.imag / h == pytest.approx(-y / square, rel=1e-15)
 
 
-def test_vectors_of_complex_numbers_carry_derivatives():
-    """d/dx |a x b| along a by complex step equals (a x b) . (e x b) / |a x b|; rounding."""
-    a, b, e, h = (0.3, -1.2, 0.8), (1.1, 0.4, -0.6), (0.2, 0.5, -0.3), 1e-30
-    stepped = tuple(complex(x, h * y) for x, y in zip(a, e, strict=True))
-    found = sqrt(norm2(cross(stepped, b)))
-    c, d = np.cross(a, b), np.cross(e, b)
-    assert found.real == pytest.approx(np.linalg.norm(c), rel=1e-14)
-    assert found.imag / h == pytest.approx(c @ d / np.linalg.norm(c), rel=1e-13)
-
-
 @pytest.mark.parametrize(
     ("function", "x", "value"),
     [
@@ -271,19 +261,6 @@ def test_symbols_pass_through_all_words():
         float(sympy.sympify(e).subs(dict(zip(symbols, values, strict=True)))) for e in expressions
     ]
     assert found == pytest.approx(wanted, rel=1e-14, abs=1e-14)
-
-
-def test_symbols_can_be_differentiated():
-    """The derivative of a kernel's formula by sympy is that of the complex step (1e-13)."""
-    sympy = pytest.importorskip("sympy")
-    x = sympy.symbols("x", real=True)
-
-    def f(x):
-        a = (x, x * x, 1.0)
-        return atan2(sqrt(norm2(a)), tanh(dot(a, (1.0, 2.0, 3.0)))) + sin(x) * cos(x)
-
-    exact = float(sympy.diff(f(x), x).subs(x, 0.7))
-    assert f(complex(0.7, 1e-30)).imag / 1e-30 == pytest.approx(exact, rel=1e-13)
 
 
 # ------------------------------------------------------------------ compiled code
@@ -358,15 +335,3 @@ def test_compiled_words_are_the_plain_ones(formula):
         with np.errstate(all="ignore"):
             wanted[:] = formula(*values)
         np.testing.assert_array_equal(found, wanted)
-
-
-def test_words_have_the_derivative_of_the_complex_step():
-    """Against a central difference, exact to 1e-9 at this step."""
-
-    def f(x):
-        angles = asin(0.5 * x) - 2.0 * acos(0.5 * x)
-        return abs(x - 2.0) * maximum(x, 0.5) * minimum(x, 3.0) + hypot(x, 2.0) + exp(-x) + angles
-
-    h = 1e-5
-    slope = (f(0.7 + h) - f(0.7 - h)) / (2.0 * h)
-    assert f(complex(0.7, 1e-30)).imag / 1e-30 == pytest.approx(slope, rel=1e-8)

@@ -3,7 +3,6 @@
 Bands of the modes of contacts behind curves.
 """
 
-import itertools
 import re
 
 import matplotlib
@@ -11,7 +10,6 @@ import matplotlib.figure
 import matplotlib.image
 import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from support.results import circling, drifting, model_of, result_of
 
@@ -172,37 +170,6 @@ def test_a_run_that_lacks_a_quantity_is_named():
         plot({"first": circling()[0], "second": drifting()}, "bob.r")
     with pytest.raises(ValueError, match="no runs"):
         plot({}, "bob.r")
-
-
-def letters(figure):
-    """Sizes of all text that is shown, points."""
-    from matplotlib.text import Text
-
-    return [t.get_fontsize() for t in figure.findobj(Text) if t.get_visible() and t.get_text()]
-
-
-def boxes(axis, figure):
-    """Where the labels of the ticks of an axis stand."""
-    shown = [t for t in axis.get_ticklabels() if t.get_text()]
-    return [t.get_window_extent(figure.canvas.get_renderer()) for t in shown]
-
-
-@pytest.mark.parametrize("names", [["bob.r.x"], ["J1.force", "bob.p"]])
-def test_it_can_be_read_at_60_mm(result, names):
-    """The usual picture set 60 mm wide has letters of 5 points; one made so wide has 8."""
-    usual = plot(result, *names).figure
-    assert min(letters(usual)) * 60.0 / 25.4 / usual.get_figwidth() >= 4.9
-    picture = curve_picture(result, names, None)
-    small = matplotlib.figure.Figure(figsize=(60 / 25.4, picture.height), layout="constrained")
-    FigureCanvasAgg(small)
-    picture.draw(small)
-    small.canvas.draw()
-    assert min(letters(small)) >= 8.0
-    for ax in small.axes:
-        for axis in (ax.xaxis, ax.yaxis):
-            found = boxes(axis, small)
-            assert not any(a.overlaps(b) for a, b in itertools.combinations(found, 2))
-        assert ax.get_window_extent().width > 0.45 * small.bbox.width
 
 
 def test_one_instant_is_drawn_as_markers():

@@ -105,30 +105,6 @@ def test_an_unknown_quantity_is_answered_before_anything_is_written(result, tmp_
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.slow
-@in_another_process
-def test_saving_needs_no_window_and_the_module_can_be_called(tmp_path):
-    """pyplot, which opens windows, stays out; dap3d_core.plot(...) works with the module loaded."""
-    code = """if True:
-        import sys
-        sys.path.insert(0, sys.argv[1])
-        from support.results import circling
-        import dap3d_core
-        import dap3d_core.plot
-        dap3d_core.plot.save_plot(circling()[0], "work", "a.png")
-        assert "matplotlib.pyplot" not in sys.modules
-        import matplotlib
-        matplotlib.use("Agg")
-        print(dap3d_core.plot(circling()[0], "work").get_ylabel())
-    """
-    tests = Path(__file__).parents[2]
-    out = subprocess.run(
-        [sys.executable, "-c", code, str(tests)], cwd=tmp_path, capture_output=True, text=True,
-        check=True,
-    )  # fmt: skip
-    assert out.stdout.strip() == "work of forces and drivers [J]"
-
-
 @pytest.mark.parametrize(
     "write",
     [

@@ -119,28 +119,6 @@ def test_text_of_a_large_scene_and_odd_names(tmp_path):
 # ---------------------------------------------------------------------------- what others read
 
 
-def test_the_file_names_its_dimensions_and_gives_units(tmp_path):
-    result, _, _ = circling(**ABOUT)
-    result.save(tmp_path / "run.nc")
-    with netCDF4.Dataset(tmp_path / "run.nc") as file:
-        sizes = {name: len(d) for name, d in file.dimensions.items()}
-        assert sizes == {
-            "time": 21, "body": 1, "axis": 3, "axis_2": 3, "euler": 4, "state": 13, "velocity": 6,
-            "row": 3, "joint": 1, "point": 3,
-        }  # fmt: skip
-        for variable in file.variables.values():
-            assert variable.units
-            assert variable.long_name
-        assert file["t"].units == "s"
-        assert file["work"].units == "J"
-        assert file["u"].dimensions == ("time", "state")
-        assert list(file["point"][:]) == ["Q", "H", "P"]
-        assert file.title == "circling"
-        assert file.scene == result.scene_text
-        assert file.status == "interrupted"
-        assert '"rtol": 1e-08' in file.settings
-
-
 def test_xarray_opens_the_file_with_names_and_units(tmp_path):
     result, _, _ = circling()
     result.save(tmp_path / "run.nc")

@@ -5,7 +5,6 @@ import pytest
 from support import problems
 from support.ended import shorten_chunks
 from support.plain import long_in_plain_python
-from support.process import start
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError
@@ -88,29 +87,3 @@ def test_other_versions_are_told():
     assert found.equal
     assert list(found.versions) == ["llvmlite"]
     assert found.versions["llvmlite"][0] == "0.1"
-
-
-DIGEST = """
-import hashlib, sys, threading
-import dap3d_core as dap
-busy = threading.Thread(target=lambda: sum(k * k for k in range(10**7)), daemon=True)
-if sys.argv[1:] == ["busy"]:
-    busy.start()
-result = dap.simulate("fourbar3", t_end=0.5, dt=0.01, integrator={integrator!r})
-seal = hashlib.sha256()
-for name in ("t", "u", "v_dot", "Lam", "work", "potential_energy"):
-    seal.update(getattr(result.arrays, name).tobytes())
-print(seal.hexdigest())
-"""
-
-
-@pytest.mark.slow
-def test_processes_give_equal_arrays_whatever_else_runs():
-    """Another seed of hashes, another thread at work, four processes at once."""
-    script = DIGEST.replace("{integrator!r}", "'dop853'")
-    busy = f"import sys; sys.argv[1:] = ['busy']\n{script}"
-    runs = [start(script, PYTHONHASHSEED=k) for k in (1, 2)] + [start(busy), start(script)]
-    found = [process.communicate(timeout=300) for process in runs]
-    assert [process.returncode for process in runs] == [0] * 4, found
-    assert len({out.strip() for out, _ in found}) == 1
-    assert len(found[0][0].strip()) == 64

@@ -4,7 +4,6 @@ import re
 
 import numpy as np
 import pytest
-from scipy.integrate import simpson
 from support import problems
 from support.own_types import registry_of
 from support.plain import long_in_plain_python
@@ -172,30 +171,6 @@ def test_equal_runs_give_equal_arrays(model):
     assert seen
 
 
-@long_in_plain_python
-def test_chunks_change_no_bit(monkeypatch):
-    """However the run is cut into chunks, and however few rows the buffer holds, its arrays are the
-    same bit for bit."""
-    compiled = dap.compile(dap.load("fourbar3"))
-    wanted = arrays_of(dap.simulate(compiled, t_end=0.2, dt=0.005))
-    for seconds, numbers in ((1e-9, 4_000_000), (10.0, 200), (1e-9, 1)):
-        monkeypatch.setattr("dap3d_core.simulation.run.FIRST_CHUNK", 100)
-        monkeypatch.setattr("dap3d_core.simulation.run.CHUNK_SECONDS", seconds)
-        monkeypatch.setattr("dap3d_core.simulation.run.BUFFER_NUMBERS", numbers)
-        assert arrays_of(dap.simulate(compiled, t_end=0.2, dt=0.005)) == wanted
-
-
-def test_a_run_leaves_the_model_as_it_was():
-    """The rates at a state are the same bits before and after a run of the same model."""
-    compiled = dap.compile(dap.load("fourbar2"))
-    u = compiled.model.u0.copy()
-    u[14:] = np.linspace(-1.0, 1.0, 12)
-    before = compiled.rhs(0.3, u)
-    dap.simulate(compiled, t_end=0.1, dt=0.05)
-    assert np.array_equal(compiled.rhs(0.3, u), before)
-    assert np.array_equal(u[14:], np.linspace(-1.0, 1.0, 12))
-
-
 # ------------------------------------------------------------------ progress and interruption
 
 
@@ -354,93 +329,7 @@ def test_a_force_without_a_value_at_the_start_and_an_energy_later(type_, fields,
         assert np.all(np.isfinite(error.result.energy.potential))
 
 
-@long_in_plain_python
-def test_a_motion_that_runs_away_stops_at_the_step_floor():
-    """v = tan t up to the last instant before pi / 2, and a finite result: relative 1e-6 at 1.5 s,
-    where errors have grown as tan^2 t = 200."""
-    scene = mass_point()
-    scene.add_force("runaway", "rocket", body_i="a")
-    error = stopped(scene, rtol=1e-10)
-    assert "step size" in str(error)
-    result = error.result
-    assert result.t[-1] == pytest.approx(1.5)
-    assert result.rd[:, 0, 0] == pytest.approx(np.tan(result.t), rel=1e-6)
-
-
-@long_in_plain_python
-def test_a_driver_whose_function_ends_stops_the_run_before_it():
-    """The angular velocity is 1 / sqrt(1.05 - t) until then (relative 1e-9: the projection holds
-    it), and the run does not step across: the function is named."""
-    scene = mass_point()
-    scene.add_function("cliff", "ramp", x_end=1.05)
-    scene.add_joint("rev", "axle", P_i="a.O", P_j="ground.O", a_i="a.z", a_j="ground.z")
-    scene.add_joint("rel-rot", "motor", body_i="a", a_j="ground.z", function="ramp")
-    error = stopped(scene)
-    assert "function ramp (type cliff) is not finite" in str(error)
-    result = error.result
-    assert result.t[-1] == pytest.approx(1.0)
-    assert result.w[:, 0, 2] == pytest.approx(-1.0 / np.sqrt(1.05 - result.t), rel=1e-9)
-    assert np.all(np.isfinite(result.Lam))
-
-
 # ------------------------------------------------------------------ constraints and energy
-
-
-@long_in_plain_python
-@pytest.mark.parametrize("model", ["pen2", "fourbar3"])
-def test_projection_holds_at_every_reported_state(model):
-    """At rtol 1e-4, between steps too: |C| and |D v - nu| stay at rounding (coordinates of 5 m and
-    velocities of 25 rad/s: 1e-12), where without projection they are a thousand times as large."""
-    scene = dap.load(model)
-    compiled = dap.compile(scene)
-    worst = {}
-    for project in (True, False):
-        result = dap.simulate(compiled, t_end=1.0, dt=0.004, rtol=1e-4, atol=1e-6, project=project)
-        found = np.zeros(2)
-        for t, u in zip(result.t, result.u, strict=True):
-            rows = compiled.evaluator.rows(t, u)
-            velocity = rows.dense() @ u[7 * compiled.model.body_count :] - rows.nu
-            found = np.maximum(found, [np.max(np.abs(rows.C)), np.max(np.abs(velocity))])
-        worst[project] = found
-        assert len(result.t) > 2 * result.stats.steps
-        largest = [np.max(result.arrays.position_residual), np.max(result.arrays.velocity_residual)]
-        assert found == pytest.approx(largest, rel=0.1, abs=1e-13)  # what is reported is so
-    assert np.all(worst[True] < 1e-12)
-    assert np.all(worst[False] > 1e-9)
-
-
-@long_in_plain_python
-def test_energy_of_dampers_leaves_the_system():
-    """bodies2: the energy lost is the integral of c l_dot^2 over both dampers (Simpson, 0.5 ms: the
-    error of 1.4e-7 J at 2 ms falls by 4^4), and the ledger balances."""
-    scene = dap.load("bodies2")
-    result = dap.simulate(scene, t_end=1.0, dt=0.0005, rtol=1e-11, atol=1e-13)
-    names = list(result.model.point_names)
-    power = 0.0
-    for force in (f for f in scene.forces.values() if f.type == "ptp"):
-        ends = scene.vectors2[force.fields["d"]]
-        i, j = names.index(ends.P_i), names.index(ends.P_j)
-        d, d_dot = (x[:, j] - x[:, i] for x in (result.rP, result.rPd))
-        l_dot = np.sum(d * d_dot, axis=1) / np.linalg.norm(d, axis=1)
-        power = power + force.fields["c"] * l_dot**2
-    lost = result.energy.total[0] - result.energy.total[-1]
-    assert lost > 1.0
-    assert simpson(power, x=result.t) == pytest.approx(lost, abs=2e-9)
-    assert result.ledger["energy"].ok
-    assert result.ledger["energy"].value < 1e-10
-
-
-@long_in_plain_python
-def test_energy_of_a_driver_enters_the_system():
-    """fourbar3: the change of energy is the integral of lambda f_dot of the motor over half a turn
-    (Simpson, 1 ms, error below 1e-7 J of 100 J), and the ledger balances."""
-    result = dap.simulate(dap.load("fourbar3"), t_end=0.5, dt=0.001, rtol=1e-11, atol=1e-13)
-    work = simpson(result.Lam[:, -1] * 2.0 * np.pi, x=result.t)
-    change = result.energy.total[-1] - result.energy.total[0]
-    assert abs(change) > 1.0
-    assert work == pytest.approx(change, abs=1e-7)
-    assert result.ledger["energy"].ok
-    assert result.ledger["energy"].value < 1e-9
 
 
 @pytest.mark.parametrize(

@@ -54,21 +54,6 @@ def test_accelerations_and_multipliers_are_those_of_standard(tree):
     assert multipliers < MULTIPLIERS
 
 
-@pytest.mark.parametrize("joint", ["rev", "tran", "sph", "cyl", "free"])
-@pytest.mark.parametrize("hangs", [False, True])
-def test_a_body_alone_accelerates_as_by_standard(joint, hangs):
-    """One body on ground, whose rates need no recursion; and with another one that hangs on it."""
-    scene = trees.random_tree(1, 4, joints=(joint,), free=float(joint == "free"))
-    body, arm = scene.bodies["b0"], np.array([0.3, -0.4, 0.5])
-    scene.add_point("tip", "b0", arm)
-    scene.add_force("ptp", "spring", P_i="tip", P_j="ground.O", k=20.0, c=0.5, l0=1.0)
-    if hangs:
-        tip = body.r + np.array(pose(body.r, body.p).A) @ arm
-        scene.add_body("bob", mass=0.3, Jp=(0.01, 0.02, 0.03), r=tip, w=(1.0, 2.0, 3.0))
-        scene.add_joint("sph", "ball", P_i="bob.O", P_j="tip")
-    assert max(differences(scene)) < ACCELERATIONS
-
-
 def test_friction_changes_the_multipliers_as_it_does_in_standard():
     """Cylindrical, revolute and translational joints rub; multipliers settle to 1e-10 of them."""
     scene = trees.random_tree(5, 3, joints=("rev", "cyl", "tran"))
@@ -191,25 +176,6 @@ def hinged_spring(theta_0=0.0):
     return scene
 
 
-@pytest.mark.slow
-@long_in_plain_python
-def test_turns_knots_and_events_are_those_of_standard():
-    """A spring over more than a turn, a knot of its law, a quantity that passes a level."""
-    settings = {"t_end": 2.0, "dt": 0.25, "rtol": 1e-10, "atol": 1e-12}
-    results = [
-        dap.simulate(hinged_spring(), method=method, events=[dap.Event("rod.r.x", below=-0.2)],
-                     **settings)
-        for method in ("standard", "joint")
-    ]  # fmt: skip
-    right, found = results
-    assert found.u == pytest.approx(right.u, abs=1e-8)
-    assert np.count_nonzero(np.diff(np.sign(found.p[:, 0, 0]))) > 1  # more than a turn and a half
-    assert len(found.events) == len(right.events) > 1
-    for one, other in zip(found.events, right.events, strict=True):
-        assert one.t == pytest.approx(other.t, abs=1e-8)
-        assert np.asarray(one.u) == pytest.approx(np.asarray(other.u), abs=1e-7)
-
-
 @pytest.mark.parametrize("thin", [1e-3, 1e-6, 1e-9, 1e-12])
 @pytest.mark.parametrize("holder", ["ground", "post"])
 def test_a_thin_rod_on_a_ball_turns_as_euler_says(thin, holder):
@@ -235,27 +201,3 @@ def test_a_thin_rod_on_a_ball_turns_as_euler_says(thin, holder):
     right = (np.cross(arm, weight) - np.cross(w, J * w)) / J
     assert np.abs(found - right)[:2].max() < 1e-14
     assert abs(found[2]) < 5e-15 / thin
-
-
-@pytest.mark.parametrize("on_ground", [False, True])
-def test_a_thin_rotor_alone_keeps_its_spin(on_ground):
-    """Euler's equations of a symmetric body: nothing turns about its axis, at 1000 rad/s.
-    A C of 1e-9 of the other moments would divide the rounding of moments summed in global axes:
-    1e-4 rad/s^2. In the rotor's axes that of w is left, 1e-13 rad/s times w across."""
-    e, w, J = (
-        np.array([0.8, 0.3, -0.4, 0.33]),
-        np.array([0.3, -0.5, 1e3]),
-        np.array([1.0, 1.0, 1e-9]),
-    )
-    e /= np.linalg.norm(e)
-    A = np.array(pose((0.0, 0.0, 0.0), e).A)
-    scene = dap.Scene(name="rotor")
-    scene.add_body("rotor", mass=1.0, Jp=J, p=e, w=A @ w)
-    scene.add_body("other", mass=1.0, Jp=(1.0, 1.0, 1.0))
-    hung = "rotor" if on_ground else "other"
-    scene.add_joint("sph", "ball", P_i=f"{hung}.O", P_j="ground.O")
-    compiled = CompiledModel(scene, method="joint")
-    found = A.T @ compiled.evaluator.report(0.0, compiled.model.u0)[3:6]
-    error = np.abs(found + np.cross(w, J * w) / J)
-    assert error[2] < 1e-12
-    assert error[:2].max() < 1e-9

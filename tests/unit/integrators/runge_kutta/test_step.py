@@ -19,25 +19,6 @@ from support.integrands import (
 from dap3d_core.integrators import TABLEAUS
 
 
-@pytest.mark.parametrize(
-    ("name", "e", "T", "steps"),  # of the asymptotic range, with errors far above rounding
-    [
-        ("rk4", 0.3, 3.0, (160, 226, 320)),
-        ("dopri5", 0.3, 3.0, (57, 80, 113, 160)),
-        ("dop853", 0.0, 6.0, (24, 34, 48)),
-    ],
-)
-def test_order_of_fixed_steps(name, e, T, steps):
-    """On a Kepler orbit of eccentricity e the error falls as step^order."""
-    errors = []
-    for n in steps:
-        run = start(name, kepler, kepler_orbit(0.0, e), [0.0, T], step=T / n)
-        assert finish(run)[-1, 0] == T
-        assert run.statistics.steps == n
-        errors.append(np.linalg.norm(run.y - kepler_orbit(T, e)))
-    assert slope(T / np.array(steps), errors) == pytest.approx(TABLEAUS[name].order, abs=0.2)
-
-
 @pytest.mark.parametrize(("name", "h"), [("dopri5", 0.05), ("dop853", 0.15)])
 def test_order_of_dense_output(name, h):
     """Within one step dense output errs by step^(dense order + 1)."""
@@ -47,18 +28,6 @@ def test_order_of_dense_output(name, h):
         rows = finish(start(name, kepler, kepler_orbit(0.0), times, step=size))
         errors.append(np.linalg.norm(rows[1:-1, 1:] - kepler_orbit(times[1:-1])))
     assert slope(sizes, errors) == pytest.approx(TABLEAUS[name].dense_order + 1, abs=0.2)
-
-
-@pytest.mark.parametrize("name", ADAPTIVE)
-def test_tight_run_agrees_with_scipy_and_with_the_exact_solution(name):
-    """At tight tolerances every reported state, most of them interpolated, is that of scipy."""
-    times = np.linspace(0.0, 6.0, 61)
-    rows = finish(start(name, kepler, kepler_orbit(0.0), times, **TIGHT))
-    assert np.array_equal(rows[:, 0], times)
-    tight = {"rtol": 1e-12, "atol": 1e-12}
-    other = solve_ivp(kepler_f, (0.0, 6.0), kepler_orbit(0.0), "DOP853", times, **tight)
-    assert np.abs(rows[:, 1:5] - other.y.T).max() < 2e-9
-    assert np.abs(rows[:, 1:5] - kepler_orbit(times)).max() < 2e-9
 
 
 @pytest.mark.parametrize("name", ADAPTIVE)

@@ -49,18 +49,6 @@ def test_a_type_of_ones_own_on_one_body():
     assert not failed
 
 
-@pytest.mark.slow
-def test_a_gap_whose_rate_is_not_the_normal_velocity_is_found():
-    class Wrong(Pipe):
-        keyword = "wrong"
-
-        def gap(r_P_i, bore):
-            return 2.0 * (bore - sqrt(r_P_i[1] * r_P_i[1] + r_P_i[2] * r_P_i[2]))
-
-    outcomes = {check.name: check.run() for check in checks_for(Wrong)}
-    assert not outcomes["J"].ok
-
-
 def test_a_velocity_in_a_gap_is_refused():
     class Fast(Pipe):
         keyword = "fast"

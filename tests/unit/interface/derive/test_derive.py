@@ -247,15 +247,6 @@ def test_what_cannot_be_derived_is_refused_with_a_remedy():
             assert f" [{__file__}:{first + 1}]; branch by where" in str(caught.value)
 
 
-def test_a_type_that_lacks_all_says_what_it_needs():
-    class Empty(Joint):
-        keyword, rows = "empty", 1
-        P_i: Point = point()
-
-    with pytest.raises(PluginError, match="does not define C"):
-        examine(Empty)
-
-
 # ------------------------------------------------------------------ only where it is needed
 
 SCRIPT = """

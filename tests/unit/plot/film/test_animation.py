@@ -92,53 +92,6 @@ def test_every_body_has_a_colour_and_a_marker_of_its_own():
     assert len(set(sticks.colors)) == len(set(sticks.markers)) == 7
 
 
-#: Linear RGB as seen without one kind of cones (Machado, Oliveira, Fernandes 2009, severity 1).
-SEEN = {
-    "all": np.eye(3),
-    "deuteranopia": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413],
-                     [-0.011820, 0.042940, 0.968881]],
-    "protanopia": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
-                   [-0.003882, -0.048116, 1.051998]],
-    "tritanopia": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602],
-                   [0.004733, 0.691367, 0.303900]],
-}  # fmt: skip
-
-
-def lab(linear):
-    """CIELAB of a colour in linear sRGB, white of D65."""
-    to_xyz = np.array(
-        [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
-    )
-    x = to_xyz @ np.clip(linear, 0, 1) / np.array([0.9505, 1.0, 1.089])
-    f = np.where(x > 0.008856, np.cbrt(x), 7.787 * x + 16 / 116)
-    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
-
-
-@pytest.mark.parametrize("eyes", SEEN)
-def test_shades_of_usual_colours_can_be_told_apart(eyes):
-    """The names of matplotlib's cycle, and black, differ by 15 or more; 2.3 is just noticeable."""
-    names = [
-        "blue",
-        "orange",
-        "green",
-        "red",
-        "purple",
-        "brown",
-        "pink",
-        "gray",
-        "olive",
-        "cyan",
-        "black",
-    ]
-    found = {}
-    for name in names:
-        value = np.array(to_rgb(SHADES[name]))
-        linear = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
-        found[name] = lab(np.asarray(SEEN[eyes]) @ linear)
-    for a, b in itertools.combinations(names, 2):
-        assert np.linalg.norm(found[a] - found[b]) > 15.0, (eyes, a, b)
-
-
 def test_poses_between_instants_are_those_of_the_motion():
     """Uniform rotation, 21 instants 0.21 rad apart: cubics are off by less than 0.21^4 / 384."""
     result, _, _ = circling()
@@ -294,24 +247,6 @@ def test_a_colour_that_is_none_is_grey(tmp_path):
     assert dap.animate(result, tmp_path / "a.png").frames == 1
     (color,) = sticks_of(result).colors
     assert np.ptp(to_rgb(color)) < 0.1
-
-
-def test_bodies_in_one_place_keep_their_markers():
-    """Markers shrink once, for want of room, and not from picture to picture."""
-    scene = dap.Scene(name="pile")
-    for name in "abc":
-        scene.add_body(name)
-    result = dap.simulate(scene, t_end=0.0, dt=1.0)
-    sticks = sticks_of(result)
-    camera = camera_of("z", np.zeros((3, 2)))
-    limits = np.array([[-1.0, 1.0]] * 3)
-    stage = Stage(sticks, camera, limits, limits[:2], (400, 400), "")
-    sizes = []
-    for _ in range(3):
-        stage.place(*pose_at(result, 0.0), "")
-        sizes.append([float(marks.get_sizes()[0]) for marks in stage._centres.values()])
-    assert sizes[0] == sizes[2]
-    assert min(sizes[0]) > 3.0
 
 
 def test_what_is_in_front_hides_what_is_behind():

@@ -31,18 +31,6 @@ def turning():
     return dap.simulate(spinning("rev"), t_end=1.0, dt=0.05)
 
 
-def test_turns_are_counted_though_reports_are_far_apart(turning):
-    """Uniform rotation; the integration is exact but for rounding, 1e-12 of 100 rad."""
-    angle = turning.quantity("hinge.angle")
-    np.testing.assert_allclose(angle.values, RATE * turning.t, atol=1e-9)
-    np.testing.assert_allclose(turning.quantity("hinge.angle_rate").values, RATE, rtol=1e-12)
-    assert (angle.unit, angle.label) == ("rad", "angle of hinge")
-    assert turning.quantity("hinge.q1_dot")[1:] == ("angle rate of hinge", "rad/s")
-    for alias, name in {"angle": "q1", "angle_rate": "q1_dot"}.items():
-        one, other = (turning.quantity(f"hinge.{n}").values for n in (alias, name))
-        np.testing.assert_array_equal(one, other)
-
-
 def test_a_screw_has_coordinates():
     """It turns by its advance over its pitch."""
     scene = dap.Scene(name="screw")
@@ -132,18 +120,3 @@ def test_tables_hold_coordinates(turning):
     np.testing.assert_array_equal(dataset["joint_q"].values[:, 0], columns["hinge.q1"].values)
     assert dataset["coordinate"].values.tolist() == ["hinge.q1"]
     assert dataset["coordinate_unit"].values.tolist() == ["rad"]
-
-
-@long_in_plain_python
-@pytest.mark.parametrize("vary", [{"forces.gravity.gravity": [9.0, 10.0, 11.0]},
-                                  {"bodies.disc.mass": [1.0, 2.0]}])  # fmt: skip
-def test_sweeps_count_turns_in_each_run(vary):
-    """Of runs whose rows are reduced together, and of runs on their own."""
-    scene = spinning("rev")
-    scene.add_force("weight", "gravity")
-    sweep = dap.sweep(scene, vary=vary, outputs=["hinge.angle:end", "hinge.angle:series"],
-                      t_end=1.0, dt=0.05)  # fmt: skip
-    np.testing.assert_allclose(sweep["hinge.angle:end"], RATE, atol=1e-9)
-    np.testing.assert_allclose(
-        sweep["hinge.angle:series"][-1], RATE * np.arange(21) / 20, atol=1e-9
-    )

@@ -80,21 +80,6 @@ def test_bodies_are_matched_by_name_whatever_their_order():
     assert any("does not have: moon" in note for note in alone.notes)
 
 
-def test_turns_of_angles_go_on():
-    """A wheel let go at rest at -50 rad, then two runs in a row."""
-    scene = at_rest.spiral()
-    first = dap.simulate(scene, t_end=7.0, dt=0.5)  # beyond a turn
-    assert abs(first.arrays.angles[-1, 0]) > 2 * np.pi
-    second = dap.simulate(scene, start=first, t_end=0.1, dt=0.1)
-    assert second.arrays.angles[0, 0] == pytest.approx(first.arrays.angles[-1, 0], rel=1e-14)
-    renamed = at_rest.spiral()
-    renamed.forces["coil"] = renamed.forces.pop("spring")
-    renamed.forces["coil"].name = "coil"
-    third = dap.simulate(renamed, start=first, t_end=0.0)
-    assert abs(third.arrays.angles[0, 0]) <= np.pi
-    assert any("turns are counted from zero" in note for note in third.notes)
-
-
 @pytest.mark.parametrize(
     ("start", "words"),
     [

@@ -3,16 +3,9 @@
 import numpy as np
 import pytest
 from support.internals import correct_initial
-from support.mechanisms import (
-    bent_chain,
-    bricard,
-    door,
-    four_bar_row,
-    planar_four_bar,
-    torn,
-    two_motors,
-)
+from support.mechanisms import bent_chain, door, planar_four_bar, torn, two_motors
 from support.plain import long_in_plain_python
+from support.problems import four_bars
 
 import dap3d_core as dap
 from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
@@ -52,7 +45,7 @@ def test_separate_loops_are_separate_groups():
 
 def test_loops_that_share_a_joint_are_one_group():
     """In a row of four-bars each pair of neighbours has a crank's joint in common."""
-    found = dap.compile(four_bar_row(3)).redundancy()
+    found = dap.compile(four_bars(3)).redundancy()
     assert len(found.groups) == 1
     assert found.groups[0].redundant == found.rank.redundant == 9
     assert found.groups[0].joints == found.joints
@@ -70,7 +63,7 @@ def test_a_row_of_four_bars_has_three_redundant_rows_a_loop(way, monkeypatch):
         monkeypatch.setattr("dap3d_core.linear.rank.rank.PART_ROWS", 0)
     if way == "inverse iteration":
         monkeypatch.setattr("dap3d_core.linear.rank.rank.by_elimination", lambda problem, K: None)
-    found = dap.compile(four_bar_row(N, 0.3)).redundancy()
+    found = dap.compile(four_bars(N, 0.3)).redundancy()
     assert found.rank.method == way
     counts = (found.rank.rows, found.rank.rank, found.rank.redundant, found.rank.dof)
     assert counts == (15 * N + 5, 12 * N + 5, 3 * N, 1)
@@ -92,7 +85,7 @@ def test_what_hangs_on_a_loop_takes_no_part(monkeypatch):
     each; elimination still is a proof, and the pendulums' reactions are unique."""
     monkeypatch.setattr("dap3d_core.simulation.redundancy.redundancy.FEW_ROWS", 0)
     monkeypatch.setattr("dap3d_core.linear.rank.rank.PART_ROWS", 0)
-    scene = four_bar_row(4, 0.3)
+    scene = four_bars(4, 0.3)
     for k in range(1, 5):
         r = np.add(scene.bodies[f"coupler{k}"].r, (0.0, -0.5, 0.0))
         scene.add_body(f"bob{k}", mass=1.0, Jp=(0.1, 0.1, 0.1), r=r)
@@ -108,7 +101,7 @@ def test_what_hangs_on_a_loop_takes_no_part(monkeypatch):
 @long_in_plain_python
 def test_many_four_bars_are_counted_beyond_a_thousand_rows():
     """The same closed form with N = 80, as a run meets it: 1205 rows, 240 too many."""
-    found = dap.compile(four_bar_row(80, 0.3)).redundancy()
+    found = dap.compile(four_bars(80, 0.3)).redundancy()
     assert found.rank.method == "elimination"
     assert (found.rank.rows, found.rank.redundant, found.rank.dof) == (1205, 240, 1)
 
@@ -118,8 +111,8 @@ def test_many_four_bars_are_counted_beyond_a_thousand_rows():
     [
         (door(), 15, 10, 2),  # a hinge says five things; its twin says nothing new
         (planar_four_bar(), 20, 17, 1),  # 3 bodies in the plane: 9 - 8 = 1; 9 rows lock the rest
-        (four_bar_row(2), 35, 29, 1),  # benchmarks A02
-        (bricard(), 30, 29, 1),  # benchmarks A04: count says no freedom, there is one
+        (four_bars(2), 35, 29, 1),  # benchmarks A02
+        (dap.load("A04"), 30, 29, 1),  # benchmarks A04: count says no freedom, there is one
     ],
     ids=lambda value: getattr(value, "name", ""),
 )
@@ -140,7 +133,7 @@ def test_what_is_redundant_at_one_pose_alone(rows, monkeypatch):
     if rows == "many":
         monkeypatch.setattr("dap3d_core.simulation.initial.least_change.DENSE_ROWS", 0)
         monkeypatch.setattr("dap3d_core.simulation.redundancy.redundancy.FEW_ROWS", 0)
-    found, elsewhere = elsewhere_of(four_bar_row(2, np.pi / 2))
+    found, elsewhere = elsewhere_of(four_bars(2, np.pi / 2))
     assert (found.rank.rank, found.rank.redundant, found.rank.dof) == (27, 8, 3)
     assert elsewhere.everywhere is False
     assert elsewhere.poses == (29, 29, 29)
@@ -150,7 +143,7 @@ def test_what_is_redundant_at_one_pose_alone(rows, monkeypatch):
 
 def test_other_poses_are_the_same_each_time():
     """Directions are seeded: two calls agree, and the state that was asked about is left alone."""
-    compiled = dap.compile(bricard())
+    compiled = dap.compile("A04")
     u = compiled.model.u0.copy()
     found = compiled.redundancy(u)
     first = redundancy_elsewhere(compiled.evaluator, u, found)
@@ -256,7 +249,7 @@ def test_reactions_outside_of_a_group_are_unique():
 def test_what_is_said_to_be_unique_does_not_change_with_the_multipliers():
     """Multipliers moved along every combination that vanishes: reactions said to be unique stay,
     each of the others moves; by the dense Jacobian."""
-    compiled = dap.compile(four_bar_row(2, np.pi / 2))
+    compiled = dap.compile(four_bars(2, np.pi / 2))
     found = compiled.redundancy()
     D = compiled.evaluator.rows(0.0, compiled.model.u0).dense()
     left, _, _ = np.linalg.svd(D)

@@ -147,21 +147,6 @@ def test_without_a_record_the_present_state_is_the_result():
     assert result.r[0, 0, 0] == pytest.approx(0.25)
 
 
-def test_turns_of_angles_are_those_of_a_run():
-    """An element that counts turns itself, in a result that is computed at the end."""
-    scene = dap.Scene(name="wheel")
-    scene.add_body("wheel", mass=1.0, Jp=(1.0, 1.0, 1.0), w=(0.0, 0.0, 12.0))
-    scene.add_joint("rev", "hinge", P_i="wheel.O", P_j="ground.O", a_i="wheel.z", a_j="ground.z")
-    scene.add_force("rot_sda", "clock", v_i="wheel.x", v_j="ground.x", axis="ground.z", turns=True,
-                    k=2.0)  # fmt: skip
-    run = dap.start(scene)
-    for _ in range(40):
-        run.step(0.05)
-    whole = dap.simulate(scene, t_end=2.0, dt=0.05)
-    assert run.result().arrays.angles == pytest.approx(whole.arrays.angles, abs=1e-6)
-    assert np.max(np.abs(whole.arrays.angles)) > 2.0 * np.pi
-
-
 @long_in_plain_python
 @pytest.mark.parametrize("method", ["standard", "joint"])
 def test_velocities_jump_within_a_step(method):

@@ -1,6 +1,5 @@
 """An error planted in a function of two arguments, or where one is called, is found and named."""
 
-import random
 import re
 
 import pytest
@@ -34,13 +33,6 @@ class SecondInWrongOrder(Grid):
 class OfScaledArgument(Grid):
     def value(x, y, rows, columns, cells):
         return surface(x, 2.0 * y, rows, columns, cells)
-
-
-class Noisy(Grid):
-    """Always of one value: others would make its derivatives wrong as well, now and then."""
-
-    def value(x, y, rows, columns, cells):
-        return surface(x, y * random.choice((1.0, 1.0)), rows, columns, cells)
 
 
 class Branching(Grid):
@@ -110,7 +102,6 @@ class Clipped(Force):
         (NoMixed, {"derivatives"}, "f_xy is wrong by .* should be .* the derivative of f_. by ."),
         (SecondInWrongOrder, {"derivatives"}, "f_yy is wrong by .* the derivative of f_y by y"),
         (OfScaledArgument, {"derivatives"}, "f_y is wrong by .* the derivative of f by y"),
-        (Noisy, {"purity"}, "value is not pure: it uses random"),
         (Branching, {"plain"}, "value branches on a number"),
         (SlopesExchanged, {"J", "virtual power"}, "of J is wrong"),
         (NoTwist, {"gamma"}, "row 1 of gamma is wrong"),

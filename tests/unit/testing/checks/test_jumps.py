@@ -2,8 +2,6 @@
 Each type is a stop with one formula spoiled, or breaks one rule of a type. The set of checks that
 fail is asserted whole: what is right stays right."""
 
-import random
-
 import pytest
 from support.jumping import Bounce, Clutch, Stage
 from support.plain import jit_is_on
@@ -101,11 +99,6 @@ class ImpulseInGroundAxes(ImpulseWithoutReaction):
         return (P, cross(s_P_i, P)), (neg(P), neg(cross(s_P_j, P)))
 
 
-class RollsDice(PlaneStop):
-    def impulse(Jv, e):
-        return where(Jv < 0.0, -(1.0 + e) * Jv * random.random(), 0.0)
-
-
 class Branches(PlaneStop):
     def impulse(Jv, e):
         return -(1.0 + e) * Jv if Jv < 0.0 else 0.0
@@ -127,7 +120,6 @@ class Branches(PlaneStop):
         (GroundAxes, {"jump frame"}, "of J notices where ground is"),
         (ImpulseWithoutReaction, {"impulse and reaction"}, "impulse has no reaction"),
         (ImpulseInGroundAxes, {"jump frame", "impulse and reaction"}, "notices where ground is"),
-        (RollsDice, {"purity"}, "gives other numbers"),
         (Branches, {"plain", "compiled"}, "branches on a number"),
     ],
     ids=lambda v: v.__name__ if isinstance(v, type) else "",
