@@ -7,13 +7,16 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 import attrs
 
 from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.compiler.objects import OPTIMISED, Processor
+from dap3d_core.kernels.runtime import ready
 from dap3d_core.kernels.runtime.cache import cache_folder
+from dap3d_core.kernels.runtime.source_digest import source_digest
 from dap3d_core.native.beside import Module, compile_modules
 from dap3d_core.native.c_source import CalledUnit, symbols_of
 from dap3d_core.native.run.prepared import refusal
@@ -140,14 +143,15 @@ def build_objects(
 ) -> list[Path]:
     """Object files of units and of further functions (LLVM IR, symbol), in a folder.
 
-    Units are taken from the cache folder where they are there.
+    Units are taken from the cache folder or from ready-made objects where they are there.
     """
     files = [folder / f"unit{k}.o" for k in range(len(units) + len(texts))]
     paths, modules = [_path_of(unit, target) for unit in units], []
     for unit, path, file in zip(units, paths, files, strict=False):
         stored = None if path is None else objects.read_object(path)
+        stored = stored or ready.read(ready_name(unit), target.name)
         if stored is None:
-            modules.append(_module_of(unit, file))
+            modules.append(module_of(unit, file))
         else:
             file.write_bytes(stored[1])
     missing = [module.file for module in modules]
@@ -162,14 +166,29 @@ def build_objects(
 
 def _path_of(called: CalledUnit, target: Platform) -> Path | None:
     """The file of a unit in the cache folder, for the linker of a platform."""
-    unit, folder = called.unit, cache_folder()
-    is_whole = len(called.kept) == len(unit.symbols)
+    folder, name = cache_folder(), f"{called.unit.name}.{target.name}{_kind_of(called)}.o"
+    return None if folder is None else folder / name
+
+
+def ready_name(called: CalledUnit) -> str:
+    """The name of a unit for a linker among ready-made objects; "" where it has none."""
+    name = called.unit.ready_name
+    return f"{name}{_kind_of(called)}" if name else ""
+
+
+def _kind_of(called: CalledUnit) -> str:
+    """What a unit for a linker differs in from others: functions, size, what is written here."""
+    is_whole = len(called.kept) == len(called.unit.symbols)
     kind = "" if is_whole else "".join(f".{k}" for k in sorted(called.kept))
-    kind += "" if called.is_hot else ".small"
-    return None if folder is None else folder / f"{unit.name}.{target.name}{kind}.o"
+    return f"{kind}{'' if called.is_hot else '.small'}.{_own_digest()}"
 
 
-def _module_of(called: CalledUnit, file: Path) -> Module:
+@cache
+def _own_digest() -> str:
+    return source_digest(Path(__file__).read_bytes())
+
+
+def module_of(called: CalledUnit, file: Path) -> Module:
     """A unit for a linker.
 
     Its functions are seen within the library alone. Units that steps do not call, such as the

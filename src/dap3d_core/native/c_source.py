@@ -102,7 +102,8 @@ def _state_units(prepared: PreparedRun) -> list[str]:
 
 def symbols_of(unit: Unit | PairUnit) -> list[str]:
     """C names of the functions of a unit in an exported model."""
-    digest = hashlib.sha256(unit.name.encode()).hexdigest()[:16]
+    name = unit.ready_name or unit.name  # equal files wherever the code is from
+    digest = hashlib.sha256(name.encode()).hexdigest()[:16]
     return [f"dap3d_{digest}_{k}" for k in range(len(unit.symbols))]
 
 
@@ -198,6 +199,7 @@ def _numbers(prepared: PreparedRun, variables: Sequence[Variable]) -> list[str]:
         "SWITCHES": work.switches.shape[1],
         "PROJECTED": len(work.real) - at.PROJECTED,
         "DRIVES": int(prepared.drives),
+        "IMPLICIT": int(prepared.run.present.implicit),
         "INTEGRATIONS": len(prepared.advances),
         "STOPS": len(prepared.stops),
         "FUNCTIONS": image.at(prepared.functions),

@@ -94,21 +94,11 @@ def export_native(
     if format == "c" and target.is_dir() and any(target.iterdir()) and not _is_export(target):
         raise refusal(f"{target} is a folder with files of others", "give another path")
     chosen = platforms_named(platforms)
-    given = scene if isinstance(scene, Scene) else load(scene)
     options = {"allow_code": allow_code, "registry": registry} | settings
-    prepared = PreparedRun(given, **options)
-    prepared.may_start_anew &= bool(parameters)
-    given_outputs = outputs_of(prepared, outputs)
-    left_out = given_outputs.left_out
+    model = model_of(scene, outputs, parameters, target.stem, **options)
+    variables, left_out = model.variables, model.outputs.left_out
     if strict and left_out:
         raise refusal(left_out[0], "name the outputs to be exported")
-    directions = Directions.of(prepared, given_outputs)
-    chosen_parameters = _parameters(prepared, parameters, options, given_outputs)
-    variables = variables_of(prepared, given_outputs.found, chosen_parameters)
-    _refuse_shared(variables)
-    name = re.sub(r"\W+", "_", str(given.name or target.stem), flags=re.ASCII) or "model"
-    name = f"_{name}" if name[0].isdigit() else name  # an identifier of C
-    model = Exported(prepared, variables, name, given_outputs, directions)
     version = fmi if format == "fmu" else 0
     try:
         size = _write(model, chosen, target, version)
@@ -120,6 +110,31 @@ def export_native(
         format, target, tuple(p.name for p in chosen), names["input"], names["parameter"],
         names["output"], tuple(left_out), size,
     )  # fmt: skip
+
+
+def model_of(
+    scene: Scene | str | os.PathLike[str],
+    outputs: Sequence[str] | None = None,
+    parameters: Sequence[str] = (),
+    name: str = "",
+    **options: Any,
+) -> Exported:
+    """A model on its way into files; a name for a scene without one, and settings of its run.
+
+    Raises:
+        SceneError, SimulationError: as ``export_native``.
+    """
+    scene = scene if isinstance(scene, Scene) else load(scene)
+    prepared = PreparedRun(scene, **options)
+    prepared.may_start_anew &= bool(parameters)
+    given = outputs_of(prepared, outputs)
+    directions = Directions.of(prepared, given)
+    chosen = _parameters(prepared, parameters, options, given)
+    variables = variables_of(prepared, given.found, chosen)
+    _refuse_shared(variables)
+    word = re.sub(r"\W+", "_", str(scene.name or name), flags=re.ASCII) or "model"
+    word = f"_{word}" if word[0].isdigit() else word  # an identifier of C
+    return Exported(prepared, variables, word, given, directions)
 
 
 def _is_export(folder: Path) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.native.build import PLATFORMS, Platform, build_objects, link, own_platform
-from dap3d_core.native.c_source import KINDS, Variable, units_of
+from dap3d_core.native.c_source import KINDS, CalledUnit, Variable, units_of
 from dap3d_core.native.run.directions import Directions
 from dap3d_core.native.run.outputs import SYMBOL, Outputs
 from dap3d_core.native.run.prepared import PreparedRun
@@ -217,6 +217,11 @@ class Exported:
     outputs: Outputs
     directions: Directions | None
 
+    @property
+    def units(self) -> list[CalledUnit]:
+        """Units of compiled code that it calls."""
+        return units_of(self.prepared, self.directions)
+
     def link(self, source: Path, target: Platform, library: Path, archive: Path | None) -> int:
         """Make libraries of a C file, which has data.h beside it; bytes of the shared one."""
         objects = source.parent / target.name
@@ -224,8 +229,7 @@ class Exported:
         texts = [(self.outputs.text, SYMBOL)]
         if self.directions is not None:
             texts.append((self.directions.text, self.directions.symbol))
-        units = units_of(self.prepared, self.directions)
-        files = build_objects(units, texts, target, objects)
+        files = build_objects(self.units, texts, target, objects)
         library.parent.mkdir(parents=True, exist_ok=True)
         link(source, files, target, library, archive)
         return library.stat().st_size

@@ -8,9 +8,16 @@ import sys
 import numpy as np
 import pytest
 from support.binaries import macho_names, pe_names
+from support.process import REPOSITORY
 
 import dap3d_core as dap
+from dap3d_core.kernels.runtime import ready
 from dap3d_core.native import build
+from dap3d_core.native.beside import compile_modules
+from dap3d_core.native.export import model_of
+
+sys.path.append(str(REPOSITORY / "tools"))
+from ready_objects import pack_of
 
 THREADS = """
 #include <pthread.h>
@@ -144,6 +151,35 @@ def test_the_shared_library_needs_the_c_library_alone(tmp_path, optimised_librar
     assert all(name.startswith("dap3d_") for name in own)
     assert "dap3d_outputs" not in own
     assert made.size < 400_000
+
+
+def test_files_are_equal_where_objects_are_ready_made(tmp_path, monkeypatch):
+    """Nothing is compiled then but what belongs to the scene, its outputs."""
+    monkeypatch.setenv("DAP3D_READY_LEVEL", "0")
+    monkeypatch.setattr(build, "cache_folder", lambda: None)
+    made = {}
+    for whence in ("compiled", "ready-made"):
+        compiled = []
+
+        def noted(modules, target, compiled=compiled):
+            compiled.extend(modules)
+            compile_modules(modules, target)
+
+        monkeypatch.setattr(build, "compile_modules", noted)
+        out = exported(tmp_path)
+        files = sorted(path for path in out.path.rglob("*") if path.is_file())
+        made[whence] = [path.read_bytes() for path in files], len(compiled)
+        modules = [(name, build.module_of(unit, tmp_path)) for unit in model_of("pen1").units
+                   if (name := build.ready_name(unit))]  # fmt: skip
+        linked = {name: (module.text, module.level) for name, module in modules}
+        monkeypatch.setattr(ready, "FOLDER", tmp_path)
+        content, count = pack_of(build.own_platform(), {}, linked)
+        (tmp_path / f"{build.own_platform()}.pack").write_bytes(content)
+        ready._pack.cache_clear()
+    ready._pack.cache_clear()
+    assert count == len(linked)
+    assert made["ready-made"][0] == made["compiled"][0]
+    assert made["ready-made"][1] == 2 < made["compiled"][1]
 
 
 def test_without_a_compiler_it_is_refused(tmp_path, monkeypatch):

@@ -453,11 +453,13 @@ def test_a_run_where_friction_would_drive_says_so(tmp_path, contact):
 
 @pytest.mark.slow
 @pytest.mark.every(2)
-@pytest.mark.parametrize(("jams", "said"), [(-1, "rattle: slip jams again and again"),
-                                            (99, "change ever faster")])  # fmt: skip
-def test_a_run_whose_contacts_come_to_no_end_says_why(tmp_path, monkeypatch, jams, said):
-    """With limits that the first change of a mode exceeds."""
-    limits = {"MOST_CHANGES": 1, "WITHIN": 9.0, "RATTLING": 9.0, "MOST_JAMS": jams}
+@pytest.mark.parametrize(("limits", "said"), [
+    ({"MOST_CHANGES": 1, "RATTLING": 9.0, "MOST_JAMS": -1}, "rattle: slip jams again and again"),
+    ({"MOST_CHANGES": 1, "WITHIN": 9.0, "MOST_JAMS": 99}, "change ever faster"),
+    ({"MOST_STEPS": 5, "SLOW": 1.0}, "as slow slip does. Export with integrator radau"),
+])  # fmt: skip
+def test_a_run_whose_contacts_come_to_no_end_says_why(tmp_path, monkeypatch, limits, said):
+    """With limits that the first steps, or the first change of a mode, exceed."""
     for name, value in limits.items():
         monkeypatch.setattr(contact_jumps, name, value)
     made = dap.export_model("cradle", tmp_path / "c", format="c", t_end=5.0)

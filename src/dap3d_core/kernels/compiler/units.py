@@ -35,7 +35,7 @@ class Unit:
 
     Attributes:
         symbols: NAME_0, NAME_1, ...: one for each function.
-        write: as given; writes the code anew, for another target.
+        name, ready_name, write: as given; the last writes the code anew, for another target.
         results: what ``write`` returned with the code, read back from the object file.
         cost: estimated seconds to optimise it.
         has_slopes: its code is differentiated.
@@ -62,7 +62,7 @@ class Unit:
             optimise: compile optimised code at once; for short code.
             ready_name: name among ready-made objects, of which symbols are made as well.
         """
-        self.name, self.write = name, write
+        self.name, self.ready_name, self.write = name, ready_name, write
         symbol = (ready_name or name).replace("-", "_")
         self.symbols = [f"{symbol}_{k}" for k in range(count)]
         self.path = None if folder is None else folder / f"{name}.o"

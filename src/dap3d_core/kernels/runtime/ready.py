@@ -99,15 +99,18 @@ class Pack(NamedTuple):
 
 
 @cache
-def _pack() -> Pack | None:
-    """The file for this machine; None where ``DAP3D_CPU`` names another processor."""
-    if os.environ.get("DAP3D_CPU"):
-        return None
-    target = target_of(processor().triple, host_features())
-    return None if target is None else Pack.of(FOLDER / f"{target}.pack")
+def _pack(target: str) -> Pack:
+    """The file for a target."""
+    return Pack.of(FOLDER / f"{target}.pack")
 
 
-def read(name: str) -> tuple[list[Any], bytes] | None:
-    """Results and code of a ready-made unit; None where there is none."""
-    pack = _pack() if name else None
-    return None if pack is None else pack.read(name)
+def read(name: str, target: str | None = None) -> tuple[list[Any], bytes] | None:
+    """Results and code of a ready-made unit; None where there is none.
+
+    Args:
+        name: among ready-made objects; "" where it has none.
+        target: by default that of this machine, unless ``DAP3D_CPU`` names another processor.
+    """
+    if target is None and not os.environ.get("DAP3D_CPU"):
+        target = target_of(processor().triple, host_features())
+    return _pack(target).read(name) if name and target else None

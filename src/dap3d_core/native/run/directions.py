@@ -73,13 +73,14 @@ class PairUnit:
     """A unit in differentiated form, which is written for the linker and not loaded here.
 
     Attributes:
-        name, symbols: as of ``Unit``.
+        name, ready_name, symbols: as of ``Unit``.
     """
 
     def __init__(self, unit: Unit) -> None:
         """Args: the unit."""
         self._unit = unit
         self.name, self.symbols = f"{unit.name}-d{PAIR}", unit.symbols
+        self.ready_name = f"{unit.ready_name}-d{PAIR}" if unit.ready_name else ""
 
     def fresh_text(self, symbols: list[str]) -> str:
         """As of ``Unit``."""

@@ -1,5 +1,6 @@
-/* What FMI 2.0 and 3.0 have in common: an instance, its log, and events. Declarations follow the
-   Functional Mock-up Interface standard; of its types those are declared that are used. */
+/* What FMI 2.0 and 3.0 have in common: an instance, its log, events, and functions whose names the
+   files of the versions give. Declarations follow the Functional Mock-up Interface standard; of its
+   types those are declared that are used. */
 
 #ifndef FMI_H
 #define FMI_H
@@ -22,6 +23,11 @@
 #endif
 
 typedef enum { fmi_ok, fmi_warning, fmi_discard, fmi_error, fmi_fatal } fmi_status;
+typedef void *I;
+typedef uint32_t R;
+typedef fmi_status S;
+#define F ((fmu *)instance)
+#define UNUSED(x) (void)(x)
 
 /* An instance of an FMU. In model exchange t and y are those of the environment. */
 typedef struct {
@@ -80,15 +86,6 @@ static fmu *fmi_create(const char *name)
     return f;
 }
 
-static void fmi_free(fmu *f)
-{
-    if (f == NULL)
-        return;
-    dap3d_free(f->model);
-    free(f->name);
-    free(f);
-}
-
 /* The run ends at a time from here on; inputs and parameters stay as they are. */
 static fmi_status fmi_setup(fmu *f, double start, bool has_stop, double stop)
 {
@@ -124,13 +121,6 @@ static fmi_status fmi_set(fmu *f, const uint32_t *references, size_t count, cons
             return fmi_failed(f, fmi_error, dap3d_message(f->model));
         }
     }
-    return fmi_ok;
-}
-
-static fmi_status fmi_reset(fmu *f)
-{
-    begin(f->model, HORIZON);
-    f->is_initialised = f->is_terminated = false;
     return fmi_ok;
 }
 
@@ -179,23 +169,6 @@ static fmi_status fmi_completed(fmu *f, bool *event)
     return fmi_ok;
 }
 
-/* Time of the environment: no integration follows. */
-static fmi_status fmi_set_time(fmu *f, double t)
-{
-    f->model->t = real_of(f->model)[R_t] = t;
-    f->model->has_row = f->model->is_ahead = 0;
-    return fmi_ok;
-}
-
-static fmi_status fmi_set_states(fmu *f, const double *y, size_t count)
-{
-    if (count != STATES)
-        return fmi_failed(f, fmi_error, "the number of states is another");
-    memcpy(y_of(f->model), y, 8 * STATES);
-    f->model->has_row = f->model->is_ahead = 0;
-    return fmi_ok;
-}
-
 static fmi_status fmi_derivatives(fmu *f, double *rates, size_t count)
 {
     double y[STATES];
@@ -218,48 +191,108 @@ static fmi_status fmi_directional(fmu *f, const uint32_t *unknowns, size_t count
     return fmi_ok;
 }
 
-static fmi_status fmi_indicators(fmu *f, double *values, size_t count)
+/* ---------------------------------------------------- functions that both versions have */
+
+FMI_API void FMI(FreeInstance)(I instance)
+{
+    if (F == NULL)
+        return;
+    dap3d_free(F->model);
+    free(F->name);
+    free(F);
+}
+
+FMI_API S FMI(ExitInitializationMode)(I instance) { return F->is_initialised = true, fmi_ok; }
+
+FMI_API S FMI(Terminate)(I instance) { return F->is_terminated = true, fmi_ok; }
+
+FMI_API S FMI(Reset)(I instance)
+{
+    begin(F->model, HORIZON);
+    F->is_initialised = F->is_terminated = false;
+    return fmi_ok;
+}
+
+FMI_API S FMI(EnterEventMode)(I instance) { return UNUSED(instance), fmi_ok; }
+
+FMI_API S FMI(EnterContinuousTimeMode)(I instance) { return UNUSED(instance), fmi_ok; }
+
+/* Time of the environment: no integration follows. */
+FMI_API S FMI(SetTime)(I instance, double t)
+{
+    F->model->t = real_of(F->model)[R_t] = t;
+    F->model->has_row = F->model->is_ahead = 0;
+    return fmi_ok;
+}
+
+FMI_API S FMI(SetContinuousStates)(I instance, const double y[], size_t n)
+{
+    if (n != STATES)
+        return fmi_failed(F, fmi_error, "the number of states is another");
+    memcpy(y_of(F->model), y, 8 * STATES);
+    F->model->has_row = F->model->is_ahead = 0;
+    return fmi_ok;
+}
+
+FMI_API S FMI(GetContinuousStates)(I instance, double y[], size_t n)
+{
+    UNUSED(n);
+    dap3d_states(F->model, y);
+    return fmi_ok;
+}
+
+FMI_API S FMI(GetNominalsOfContinuousStates)(I instance, double nominals[], size_t n)
+{
+    UNUSED(instance);
+    for (size_t k = 0; k < n; k++)
+        nominals[k] = 1.0;
+    return fmi_ok;
+}
+
+FMI_API S FMI(GetEventIndicators)(I instance, double values[], size_t n)
 {
     double y[STATES];
-    if (count != SWITCHES)
-        return fmi_failed(f, fmi_error, "the number of event indicators is another");
-    dap3d_states(f->model, y);
-    dap3d_indicators(f->model, f->model->t, y, values);
+    if (n != SWITCHES)
+        return fmi_failed(F, fmi_error, "the number of event indicators is another");
+    dap3d_states(F->model, y);
+    dap3d_indicators(F->model, F->model->t, y, values);
     return fmi_ok;
 }
 
-static size_t fmi_state_size(void) { return sizeof(fmu_state) + dap3d_state_size(); }
-
-static void fmi_keep(const fmu *f, char *bytes)
+FMI_API S FMI_STATE(Serialized, Size)(I instance, void *state, size_t *size)
 {
-    fmu_state head = {IDENTITY, f->is_initialised, f->is_terminated};
-    memcpy(bytes, &head, sizeof head);
-    dap3d_save(f->model, bytes + sizeof head);
-}
-
-static fmi_status fmi_restore(fmu *f, const char *bytes)
-{
-    fmu_state head;
-    memcpy(&head, bytes, sizeof head);
-    if (head.identity != IDENTITY || dap3d_load(f->model, bytes + sizeof head) != DAP3D_OK)
-        return fmi_failed(f, fmi_error, "the state is not one of this FMU");
-    f->is_initialised = head.is_initialised;
-    f->is_terminated = head.is_terminated;
+    UNUSED(instance), UNUSED(state);
+    *size = sizeof(fmu_state) + dap3d_state_size();
     return fmi_ok;
 }
 
-static fmi_status fmi_get_state(const fmu *f, void **state)
+FMI_API S FMI_STATE(Get, )(I instance, void **state)
 {
+    fmu_state head = {IDENTITY, F->is_initialised, F->is_terminated};
     if (*state == NULL)
-        *state = malloc(fmi_state_size());
+        *state = malloc(sizeof head + dap3d_state_size());
     if (*state == NULL)
         return fmi_error;
-    fmi_keep(f, *state);
+    memcpy(*state, &head, sizeof head);
+    dap3d_save(F->model, (char *)*state + sizeof head);
     return fmi_ok;
 }
 
-static fmi_status fmi_free_state(void **state)
+FMI_API S FMI_STATE(Set, )(I instance, void *state)
 {
+    fmu_state head;
+    memcpy(&head, state, sizeof head);
+    if (head.identity != IDENTITY
+        || dap3d_load(F->model, (char *)state + sizeof head) != DAP3D_OK)
+        return fmi_failed(F, fmi_error, "the state is not one of this FMU");
+    F->is_initialised = head.is_initialised;
+    F->is_terminated = head.is_terminated;
+    return fmi_ok;
+}
+
+FMI_API S FMI_STATE(Free, )(I instance, void **state)
+{
+    UNUSED(instance);
     if (state != NULL) {
         free(*state);
         *state = NULL;
@@ -267,24 +300,35 @@ static fmi_status fmi_free_state(void **state)
     return fmi_ok;
 }
 
-static fmi_status fmi_write_state(fmu *f, const void *state, void *bytes, size_t size)
+FMI_API S FMI_STATE(Serialize, )(I instance, void *state, char bytes[], size_t size)
 {
-    if (size < fmi_state_size())
-        return fmi_failed(f, fmi_error, "there is too little room for the state");
-    memcpy(bytes, state, fmi_state_size());
+    if (size < sizeof(fmu_state) + dap3d_state_size())
+        return fmi_failed(F, fmi_error, "there is too little room for the state");
+    memcpy(bytes, state, sizeof(fmu_state) + dap3d_state_size());
     return fmi_ok;
 }
 
-static fmi_status fmi_read_state(fmu *f, const void *bytes, size_t size, void **state)
+FMI_API S FMI_READ_STATE(I instance, const char bytes[], size_t size, void **state)
 {
-    if (size != fmi_state_size())
-        return fmi_failed(f, fmi_error, "the state is not one of this FMU");
+    if (size != sizeof(fmu_state) + dap3d_state_size())
+        return fmi_failed(F, fmi_error, "the state is not one of this FMU");
     if (*state == NULL)
         *state = malloc(size);
     if (*state == NULL)
         return fmi_error;
     memcpy(*state, bytes, size);
     return fmi_ok;
+}
+
+/* Functions of what there is none of; their arguments are not read. */
+#define ABSENT(name, ...)                                                                         \
+    FMI_API S name(I instance, __VA_ARGS__) { return fmi_failed(F, fmi_error, #name ": no such"); }
+#define P const void *
+typedef const char *text;
+
+static S fmi_none(fmu *f, size_t count)
+{
+    return count == 0 ? fmi_ok : fmi_failed(f, fmi_error, "there is no variable of such a type");
 }
 
 #endif

@@ -1,11 +1,11 @@
 /* Functional Mock-up Interface 2.0: co-simulation and model exchange. */
 
+#define FMI(name) fmi2##name
+#define FMI_STATE(before, behind) fmi2##before##FMUstate##behind
+#define FMI_READ_STATE fmi2DeSerializeFMUstate
 #include "token.h"
 #include "fmi.h"
 
-typedef void *I;
-typedef unsigned int R;
-typedef fmi_status S;
 typedef void (*logger2)(void *, const char *, int, const char *, const char *, ...);
 typedef struct {
     logger2 logger;
@@ -18,8 +18,6 @@ typedef struct {
     int again, terminate, nominals, states, has_next;
     double next;
 } event_info2;
-#define F ((fmu *)instance)
-#define UNUSED(x) (void)(x)
 
 static void fmi_log(fmu *f, fmi_status status, const char *category, const char *words)
 {
@@ -60,8 +58,6 @@ FMI_API I fmi2Instantiate(const char *name, int type, const char *token, const c
     return f;
 }
 
-FMI_API void fmi2FreeInstance(I instance) { fmi_free(F); }
-
 FMI_API S fmi2SetupExperiment(I instance, int has_tolerance, double tolerance, double start,
                               int has_stop, double stop)
 {
@@ -75,20 +71,6 @@ FMI_API S fmi2EnterInitializationMode(I instance)
     return fmi_ok;
 }
 
-FMI_API S fmi2ExitInitializationMode(I instance)
-{
-    F->is_initialised = true;
-    return fmi_ok;
-}
-
-FMI_API S fmi2Terminate(I instance)
-{
-    F->is_terminated = true;
-    return fmi_ok;
-}
-
-FMI_API S fmi2Reset(I instance) { return fmi_reset(F); }
-
 FMI_API S fmi2GetReal(I instance, const R r[], size_t n, double v[]) { return fmi_get(F, r, n, v); }
 
 FMI_API S fmi2SetReal(I instance, const R r[], size_t n, const double v[])
@@ -101,21 +83,17 @@ FMI_API S fmi2SetReal(I instance, const R r[], size_t n, const double v[])
     FMI_API S fmi2Get##name(I instance, const R r[], size_t n, type v[])                          \
     {                                                                                             \
         UNUSED(r), UNUSED(v);                                                                     \
-        return n == 0 ? fmi_ok : fmi_failed(F, fmi_error, "there is no variable of such a type"); \
+        return fmi_none(F, n);                                                                    \
     }                                                                                             \
     FMI_API S fmi2Set##name(I instance, const R r[], size_t n, const type v[])                    \
     {                                                                                             \
         UNUSED(r), UNUSED(v);                                                                     \
-        return n == 0 ? fmi_ok : fmi_failed(F, fmi_error, "there is no variable of such a type"); \
+        return fmi_none(F, n);                                                                    \
     }
-typedef const char *text;
 NONE(Integer, int)
 NONE(Boolean, int)
 NONE(String, text)
 
-#define ABSENT(name, ...)                                                                         \
-    FMI_API S name(I instance, __VA_ARGS__) { return fmi_failed(F, fmi_error, #name ": no such"); }
-#define P const void *
 FMI_API S fmi2GetDirectionalDerivative(I instance, const R unknowns[], size_t count,
                                        const R knowns[], size_t given, const double seed[],
                                        double result[])
@@ -127,42 +105,7 @@ ABSENT(fmi2GetRealOutputDerivatives, P, size_t, P, P)
 ABSENT(fmi2GetStringStatus, int, P)
 ABSENT(fmi2GetIntegerStatus, int, P)
 
-/* ---------------------------------------------------------------------- states */
-
-FMI_API S fmi2GetFMUstate(I instance, void **state) { return fmi_get_state(F, state); }
-
-FMI_API S fmi2SetFMUstate(I instance, void *state) { return fmi_restore(F, state); }
-
-FMI_API S fmi2FreeFMUstate(I instance, void **state)
-{
-    UNUSED(instance);
-    return fmi_free_state(state);
-}
-
-FMI_API S fmi2SerializedFMUstateSize(I instance, void *state, size_t *size)
-{
-    UNUSED(instance), UNUSED(state);
-    *size = fmi_state_size();
-    return fmi_ok;
-}
-
-FMI_API S fmi2SerializeFMUstate(I instance, void *state, char bytes[], size_t size)
-{
-    return fmi_write_state(F, state, bytes, size);
-}
-
-FMI_API S fmi2DeSerializeFMUstate(I instance, const char bytes[], size_t size, void **state)
-{
-    return fmi_read_state(F, bytes, size, state);
-}
-
 /* ---------------------------------------------------------------------- model exchange */
-
-FMI_API S fmi2EnterEventMode(I instance)
-{
-    UNUSED(instance);
-    return fmi_ok;
-}
 
 FMI_API S fmi2NewDiscreteStates(I instance, event_info2 *info)
 {
@@ -176,12 +119,6 @@ FMI_API S fmi2NewDiscreteStates(I instance, event_info2 *info)
     return status;
 }
 
-FMI_API S fmi2EnterContinuousTimeMode(I instance)
-{
-    UNUSED(instance);
-    return fmi_ok;
-}
-
 FMI_API S fmi2CompletedIntegratorStep(I instance, int no_set_state, int *event, int *terminate)
 {
     bool due;
@@ -192,36 +129,9 @@ FMI_API S fmi2CompletedIntegratorStep(I instance, int no_set_state, int *event, 
     return status;
 }
 
-FMI_API S fmi2SetTime(I instance, double t) { return fmi_set_time(F, t); }
-
-FMI_API S fmi2SetContinuousStates(I instance, const double y[], size_t n)
-{
-    return fmi_set_states(F, y, n);
-}
-
 FMI_API S fmi2GetDerivatives(I instance, double rates[], size_t n)
 {
     return fmi_derivatives(F, rates, n);
-}
-
-FMI_API S fmi2GetEventIndicators(I instance, double values[], size_t n)
-{
-    return fmi_indicators(F, values, n);
-}
-
-FMI_API S fmi2GetContinuousStates(I instance, double y[], size_t n)
-{
-    UNUSED(n);
-    dap3d_states(F->model, y);
-    return fmi_ok;
-}
-
-FMI_API S fmi2GetNominalsOfContinuousStates(I instance, double nominals[], size_t n)
-{
-    UNUSED(instance);
-    for (size_t k = 0; k < n; k++)
-        nominals[k] = 1.0;
-    return fmi_ok;
 }
 
 /* ---------------------------------------------------------------------- co-simulation */

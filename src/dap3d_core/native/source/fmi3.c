@@ -1,14 +1,12 @@
 /* Functional Mock-up Interface 3.0: co-simulation and model exchange. */
 
+#define FMI(name) fmi3##name
+#define FMI_STATE(before, behind) fmi3##before##FMUState##behind
+#define FMI_READ_STATE fmi3DeserializeFMUState
 #include "token.h"
 #include "fmi.h"
 
-typedef void *I;
-typedef uint32_t R;
 typedef void (*logger3)(void *, int, const char *, const char *);
-typedef fmi_status S;
-#define F ((fmu *)instance)
-#define UNUSED(x) (void)(x)
 
 static void fmi_log(fmu *f, fmi_status status, const char *category, const char *words)
 {
@@ -77,25 +75,11 @@ FMI_API I fmi3InstantiateScheduledExecution(const char *name, const char *token,
     return NULL;
 }
 
-FMI_API void fmi3FreeInstance(I instance) { fmi_free(F); }
-
 FMI_API S fmi3EnterInitializationMode(I instance, bool has_tolerance, double tolerance,
                                       double start, bool has_stop, double stop)
 {
     UNUSED(has_tolerance), UNUSED(tolerance);
     return fmi_setup(F, start, has_stop, stop);
-}
-
-FMI_API S fmi3ExitInitializationMode(I instance)
-{
-    F->is_initialised = true;
-    return fmi_ok;
-}
-
-FMI_API S fmi3EnterEventMode(I instance)
-{
-    UNUSED(instance);
-    return fmi_ok;
 }
 
 FMI_API S fmi3EnterStepMode(I instance)
@@ -110,14 +94,6 @@ FMI_API S fmi3EnterConfigurationMode(I instance)
 }
 
 FMI_API S fmi3ExitConfigurationMode(I instance) { return fmi3EnterConfigurationMode(instance); }
-
-FMI_API S fmi3Terminate(I instance)
-{
-    F->is_terminated = true;
-    return fmi_ok;
-}
-
-FMI_API S fmi3Reset(I instance) { return fmi_reset(F); }
 
 FMI_API S fmi3GetFloat64(I instance, const R r[], size_t n, double v[], size_t nv)
 {
@@ -134,14 +110,13 @@ FMI_API S fmi3SetFloat64(I instance, const R r[], size_t n, const double v[], si
     FMI_API S fmi3Get##name(I instance, const R r[], size_t n, type v[], size_t nv)               \
     {                                                                                             \
         UNUSED(r), UNUSED(v), UNUSED(nv);                                                         \
-        return n == 0 ? fmi_ok : fmi_failed(F, fmi_error, "there is no variable of such a type"); \
+        return fmi_none(F, n);                                                                    \
     }                                                                                             \
     FMI_API S fmi3Set##name(I instance, const R r[], size_t n, const type v[], size_t nv)         \
     {                                                                                             \
         UNUSED(r), UNUSED(v), UNUSED(nv);                                                         \
-        return n == 0 ? fmi_ok : fmi_failed(F, fmi_error, "there is no variable of such a type"); \
+        return fmi_none(F, n);                                                                    \
     }
-typedef const char *text;
 NONE(Float32, float)
 NONE(Int8, int8_t)
 NONE(UInt8, uint8_t)
@@ -155,9 +130,6 @@ NONE(Boolean, bool)
 NONE(String, text)
 
 /* Functions of what there is none of; their arguments are not read. */
-#define ABSENT(name, ...)                                                                         \
-    FMI_API S name(I instance, __VA_ARGS__) { return fmi_failed(F, fmi_error, #name ": no such"); }
-#define P const void *
 ABSENT(fmi3GetBinary, P, size_t, P, P, size_t)
 ABSENT(fmi3SetBinary, P, size_t, P, P, size_t)
 ABSENT(fmi3GetClock, P, size_t, P)
@@ -203,42 +175,7 @@ FMI_API S fmi3UpdateDiscreteStates(I instance, bool *again, bool *terminate, boo
     return status;
 }
 
-/* ---------------------------------------------------------------------- states */
-
-FMI_API S fmi3GetFMUState(I instance, void **state) { return fmi_get_state(F, state); }
-
-FMI_API S fmi3SetFMUState(I instance, void *state) { return fmi_restore(F, state); }
-
-FMI_API S fmi3FreeFMUState(I instance, void **state)
-{
-    UNUSED(instance);
-    return fmi_free_state(state);
-}
-
-FMI_API S fmi3SerializedFMUStateSize(I instance, void *state, size_t *size)
-{
-    UNUSED(instance), UNUSED(state);
-    *size = fmi_state_size();
-    return fmi_ok;
-}
-
-FMI_API S fmi3SerializeFMUState(I instance, void *state, uint8_t bytes[], size_t size)
-{
-    return fmi_write_state(F, state, bytes, size);
-}
-
-FMI_API S fmi3DeserializeFMUState(I instance, const uint8_t bytes[], size_t size, void **state)
-{
-    return fmi_read_state(F, bytes, size, state);
-}
-
 /* ---------------------------------------------------------------------- model exchange */
-
-FMI_API S fmi3EnterContinuousTimeMode(I instance)
-{
-    UNUSED(instance);
-    return fmi_ok;
-}
 
 FMI_API S fmi3CompletedIntegratorStep(I instance, bool no_set_state, bool *event, bool *terminate)
 {
@@ -247,36 +184,9 @@ FMI_API S fmi3CompletedIntegratorStep(I instance, bool no_set_state, bool *event
     return fmi_completed(F, event);
 }
 
-FMI_API S fmi3SetTime(I instance, double t) { return fmi_set_time(F, t); }
-
-FMI_API S fmi3SetContinuousStates(I instance, const double y[], size_t n)
-{
-    return fmi_set_states(F, y, n);
-}
-
 FMI_API S fmi3GetContinuousStateDerivatives(I instance, double rates[], size_t n)
 {
     return fmi_derivatives(F, rates, n);
-}
-
-FMI_API S fmi3GetEventIndicators(I instance, double values[], size_t n)
-{
-    return fmi_indicators(F, values, n);
-}
-
-FMI_API S fmi3GetContinuousStates(I instance, double y[], size_t n)
-{
-    UNUSED(n);
-    dap3d_states(F->model, y);
-    return fmi_ok;
-}
-
-FMI_API S fmi3GetNominalsOfContinuousStates(I instance, double nominals[], size_t n)
-{
-    UNUSED(instance);
-    for (size_t k = 0; k < n; k++)
-        nominals[k] = 1.0;
-    return fmi_ok;
 }
 
 FMI_API S fmi3GetNumberOfEventIndicators(I instance, size_t *n)

@@ -509,7 +509,8 @@ static void say_failure(dap3d_model *m, double t)
         " jams: its friction presses the bodies together by more than it lets them give way",
         ": its bodies overlap at the start", " would drive: its friction is negative",
         " jams: an impact has no impulse within the cone of its friction. Try law = poisson", "s change ever faster",
-        "s slip and turn by next to nothing, or rattle: slip jams again and again. Try smaller mu"};
+        IMPLICIT ? "s slip and turn by next to nothing, or rattle: slip jams again and again. Try smaller mu"
+        : "s ask for ever shorter steps, as slow slip does. Export with integrator radau, or try smaller mu"};
     int has_name = m->failure < ENDLESS;
     const char *name = has_name ? contact_names[m->w[CONTACT_INTEGER + CI_culprit]] : "";
     int rattles = m->failure == ENDLESS && m->w[CONTACT_INTEGER + CI_freed] > MOST_JAMS;
