@@ -130,7 +130,8 @@ def results(
 ) -> Any:  # fmt: skip
     """What function k of an evaluator gives for symbols; a projection changes y, too.
 
-    outcome: of a projection. is_behind: it is behind the right-hand side of its state.
+    outcome: of a projection.
+    is_behind: it is behind the right-hand side of its state.
     """
     with run_with_symbols():
         function, loops = evaluator.coordinates.function, python_loops(evaluator)
@@ -176,7 +177,8 @@ def write_program(
         varied: as of ``constants``.
         tracer: records the program; left out, one of as many instructions as it may have.
         others: of a projection, as of ``merged`` (ways.py).
-        count: as of ``write_programs``. is_behind: of a projection, as of ``results``.
+        count: as of ``write_programs``.
+        is_behind: of a projection, as of ``results``.
 
     Raises:
         TraceError: the program would be too long, or have too many guards.
@@ -300,7 +302,8 @@ def write_programs(
 
     Args:
         evaluator: of the scene, as a run begins.
-        name: of the programs; reports are among them where it ends in ``REPORTS``; ``ALONE``.
+        name: of the programs; reports are among them where it ends in ``REPORTS``, and projections
+            stand alone where ``ALONE`` is in it.
         time, state: where branches are decided.
         varied: as of ``constants``.
         others: of projections, as of ``merged`` (ways.py), unless that were too long.
