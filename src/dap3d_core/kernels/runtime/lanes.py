@@ -9,7 +9,7 @@ import ctypes
 import functools
 import inspect
 import threading
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from dap3d_core.kernels.compiler.derivatives import differentiate
 from dap3d_core.kernels.compiler.derivatives.instructions import layout
 from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.lanes import widen
-from dap3d_core.kernels.compiler.types import COMPLEX, FLOAT, Signature, Struct
+from dap3d_core.kernels.compiler.types import COMPLEX, FLOAT, Signature, Struct, Tuple
 from dap3d_core.kernels.compiler.units import Entry, Functions, Unit, address_of, type_of
 from dap3d_core.kernels.runtime.array_struct import Arrays
 from dap3d_core.kernels.runtime.cache import cache_folder, names_of
@@ -112,7 +112,7 @@ class ValueFunctions:
 
     def __init__(self, table: Functions, run: Callable[..., None]) -> None:
         """Args: the plain functions; runs one of them, given it and addresses of its arguments."""
-        words = [ctypes.c_void_p] * len(table.signature.arguments)
+        words = [ctypes.c_void_p for type_ in table.signature.arguments for _ in type_.words]
         kind = ctypes.CFUNCTYPE(None, *words)
         self._calls = [kind(functools.partial(run, entry)) for entry in table.entries]
         addresses = [ctypes.cast(call, ctypes.c_void_p).value or 0 for call in self._calls]
@@ -282,6 +282,14 @@ class Differentiation:
     def _run_plain(self, entry: Entry, *addresses: int) -> None:
         """Call a function from differentiated code with the plain arrays."""
         plain = {wide.address: argument for argument, wide in self._wide.values()}
+        given = iter([plain[address] for address in addresses])
         self._any.give()
-        entry(*(plain[address] for address in addresses))
+        entry(*(_of_type(type_, given) for type_ in entry.signature.arguments))
         self.take()
+
+
+def _of_type(type_: Any, items: Iterator[Any]) -> Any:
+    """The next of some items, or a tuple of them."""
+    if isinstance(type_, Tuple):
+        return tuple([_of_type(item, items) for item in type_.items])
+    return next(items)
