@@ -125,7 +125,7 @@ def solve_forces(
     False where there are none; of fewer tries than all that is left open.
 
     part: of the cones; contacts that are ``slipping`` have mu, not mu_s.
-    least: normal force of each, N, which widens no cone: so much is left to the rim of a small one.
+    least: normal force of each, N.
     resisting: the same part again of what resists rolling.
     """
     n, cone = 3 * s.closed_count, s.cone
@@ -150,6 +150,7 @@ def solve_forces(
             for i in range(n):
                 cone.b[i] += least * cone.A[i, 3 * k]
             cone.x[3 * k] -= least
+            cone.more[k] += least
     left = solve_cone(cone, tries)
     if left > UNSOLVED and tries == TRIES:
         for k in range(s.closed_count):

@@ -17,8 +17,8 @@ HELD, OF_REST, RATE_ROUNDING = 1e-9, 0.05, 1e-13
 FORCE_ROUNDING = 1e-12
 #: How many parts of their cones within which contacts that share what they carry may be to stay,
 #: each leaving half of what the one before leaves: what they carry reaches its limit with so much
-#: left, 1.5e-8. And how many normal forces, each half of the one before.
-PARTS = 26
+#: left, 1e-9. And how many normal forces, each half of the one before.
+PARTS = 30
 #: Normal force that each of them has, as a part of an equal share, where it can: what carried
 #: nothing would be at its limit at once.
 LEAST = 0.2
