@@ -177,8 +177,7 @@ def write_program(
         varied: as of ``constants``.
         tracer: records the program; left out, one of as many instructions as it may have.
         others: of a projection, as of ``merged`` (ways.py).
-        count: as of ``write_programs``.
-        is_behind: of a projection, as of ``results``.
+        count, is_behind: as of ``write_programs``, ``results``.
 
     Raises:
         TraceError: the program would be too long, or have too many guards.
@@ -302,8 +301,7 @@ def write_programs(
 
     Args:
         evaluator: of the scene, as a run begins.
-        name: of the programs; reports are among them where it ends in ``REPORTS``, and projections
-            stand alone where ``ALONE`` is in it.
+        name: of the programs; ``REPORTS`` and ``ALONE`` in it say which there are.
         time, state: where branches are decided.
         varied: as of ``constants``.
         others: of projections, as of ``merged`` (ways.py), unless that were too long.
