@@ -41,6 +41,7 @@ def test_tables_fit_the_width(dap3d):
     assert all(len(row.split()) >= 6 for row in rows)  # no column is folded away
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_signal_keeps_what_was_measured(dap3d):
     process = dap3d.start("report", "pen1", *QUICK, "--repeat", "1000", "--method", "standard",

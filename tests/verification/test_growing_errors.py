@@ -54,6 +54,7 @@ def test_the_double_pendulum_by_taylor_series():
         assert max(abs(double_pendulum.energy(state)) for state in found) < Decimal("1e-26")
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.parametrize("rtol", [1e-8, 1e-10])
 def test_it_says_from_when_on_a_chaotic_motion_is_lost(motion, rtol):

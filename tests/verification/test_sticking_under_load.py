@@ -409,6 +409,7 @@ def test_joint_coordinates_give_the_same(scene, t_end):
         assert one.friction == pytest.approx(two.friction, rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_modes_of_many_hinges_end_at_rounding():
     """What twenty hinges hold is found to 1e-9 of it, which is no jam; it stays in their cones."""
