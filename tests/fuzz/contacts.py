@@ -19,7 +19,7 @@ from dap3d_core.formulations.programs import change_over
 from fuzz.varied_contacts import settings_of, varied_scene
 
 #: s simulated, and of varied scenes; s of CPU time after which a run hangs.
-SPAN, SHORT, HANG = 1.0, 0.3, 60.0
+SPAN, SHORT, HANG = 1.0, 0.3, 20.0
 SETTINGS = {"rtol": 1e-10, "atol": 1e-12, "integrator": "dop853", "contact": "events"}
 #: Gains of energy, and depths, as parts of energy and length of the scene. Where a run reports
 #: between events a gap is as good as the state: so many times its relative tolerance.

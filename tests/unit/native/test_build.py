@@ -153,6 +153,7 @@ def test_the_shared_library_needs_the_c_library_alone(tmp_path, optimised_librar
     assert made.size < 400_000
 
 
+@pytest.mark.slow
 def test_files_are_equal_where_objects_are_ready_made(tmp_path, monkeypatch):
     """Nothing is compiled then but what belongs to the scene, its outputs."""
     monkeypatch.setenv("DAP3D_READY_LEVEL", "0")

@@ -143,7 +143,9 @@ def found(request):
     return repeated(RUNS, ["differentiated"], MORE, [request.param])
 
 
-@pytest.mark.parametrize("level", ["O0", pytest.param("O3", marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "level", ["O0", pytest.param("O3", marks=[pytest.mark.slow, pytest.mark.long])]
+)
 def test_calls_of_a_short_run_have_the_bits_of_plain_python(level):
     (count, different), *_ = repeated(QUICK, [level])
     assert count > 100

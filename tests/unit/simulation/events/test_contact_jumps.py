@@ -301,6 +301,7 @@ def test_steps_that_lead_nowhere_stop_the_run_and_name_the_contact(monkeypatch):
     assert c.value.result is not None
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_slip_that_is_stiff_is_taken_across_by_radau():
     """A coin that falls over rolls, and slips again where its point of contact races around."""
