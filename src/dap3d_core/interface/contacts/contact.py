@@ -263,12 +263,13 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
         special = grips.KERNELS if "at" in declared else grips.TURNING
     if special:
         return {name: bound(kernel) for name, kernel in special.items()}
+    ends = "reach" in declared
     return {
-        "C": bound(rows.position_within if "reach" in declared else rows.position),
+        "C": bound(rows.position_within if ends else rows.position),
         "J": bound(rows.blocks if has_j else rows.block),
         "gamma": bound(rows.gamma),
         "friction": bound(rows.friction if has_j else rows.friction_of_one),
-        "switch": bound(rows.switch),
+        "switch": bound(rows.switch_within if ends else rows.switch),
         "rate": rows.rate,
         "tension": bound(rows.output_with_law if "grip" in declared else rows.output),
     }

@@ -212,8 +212,8 @@ def friction_of_one(c, n, grain, r_i, v_i, w_i, lam, grip, mode, way, near):
     return friction(c, n, grain, r_i, v_i, w_i, *other, lam, grip, mode, way, near)[0]
 
 
-def switch(gap, reach, c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, hold, mode, way, near):
-    """What ends a mode where it is negative: gap; force, reach; slip, rest of a cone."""
+def switch(gap, c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, hold, mode, way, near):
+    """What ends a mode where it is negative: gap, normal force; slip, rest of a cone."""
     normal, tangential = forces(
         c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, mode, way, near
     )
@@ -226,13 +226,20 @@ def switch(gap, reach, c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, hol
     slides = where(mu > 0.0, dot(slip, unit(across(way, n))), 1.0)
     sticks = where(mu_s > 0.0, mu_s * normal - sqrt(dot(held_by, held_by)), 1.0)
     return (
-        where(
-            closed(mode),
-            where(reach < normal, reach, normal),
-            where(reach < 0.0, APART, gap),
-        ),
+        where(closed(mode), normal, gap),
         where(held(mode), sticks, where(closed(mode), slides, 1.0)),
     )
+
+
+def switch_within(
+    gap, reach, c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, hold, mode, way, near
+):
+    """The same of surfaces that end: the reach as well, of what is closed."""
+    ends, slips = switch(
+        gap, c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, hold, mode, way, near
+    )
+    open_, held_within = where(reach < 0.0, APART, ends), where(reach < ends, reach, ends)
+    return where(closed(mode), held_within, open_), slips
 
 
 def rate(mode, way, near):
