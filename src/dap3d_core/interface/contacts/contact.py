@@ -20,9 +20,10 @@ LAWS = ("poisson", "newton")
 #: Initial mode of a contact that touches as the scene is assembled.
 TOUCHES = 1.0
 _ZERO = (0.0, 0.0, 0.0)
-#: Fields that a run knows best: which point it is, and the initial values of its states.
+#: Fields that a run knows best: which point it is, kg that forces are measured by, and the initial
+#: values of its states.
 HIDDEN: dict[str, Any] = {
-    "part": 0.0, "mode_0": 0.0, "way_0": _ZERO, "near_0": _ZERO,
+    "part": 0.0, "unit_mass": 1.0, "mode_0": 0.0, "way_0": _ZERO, "near_0": _ZERO,
     "mode_atol": 0.0, "way_atol": 0.0, "near_atol": 0.0,
 }  # fmt: skip
 #: What a contact without friction has in place of a material.

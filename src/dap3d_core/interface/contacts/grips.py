@@ -75,23 +75,23 @@ def turning_friction(e, mu, mode, way, near):
     return (_ZERO, M), (_ZERO, neg(M))
 
 
-def ends(speed, e, lam, mu, mu_s, mode, way, near):
+def ends(speed, e, lam, mu, mu_s, mode, way, near, unit_mass):
     """What ends a mode where it is negative: nothing; slip, or the rest of what sticks."""
     size = whole(e, lam, mu, mode, way, near)
-    sticks = where(mu_s > 0.0, mu_s - maximum(size, -size), 1.0)
+    sticks = where(mu_s > 0.0, (mu_s - maximum(size, -size)) / unit_mass, 1.0)
     slides = where(mu > 0.0, speed * sense(e, way), 1.0)
     return 1.0, where(held(mode), sticks, where(closed(mode), slides, 1.0))
 
 
-def switch(c, e, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mu_s, mode, way, near):
+def switch(c, e, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mu_s, mode, way, near, unit_mass):
     """As ``ends``."""
     speed = dot(e, slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j))
-    return ends(speed, e, lam, mu, mu_s, mode, way, near)
+    return ends(speed, e, lam, mu, mu_s, mode, way, near, unit_mass)
 
 
-def turning_switch(e, w_i, w_j, lam, mu, mu_s, mode, way, near):
+def turning_switch(e, w_i, w_j, lam, mu, mu_s, mode, way, near, unit_mass):
     """As ``ends``."""
-    return ends(dot(e, sub(w_i, w_j)), e, lam, mu, mu_s, mode, way, near)
+    return ends(dot(e, sub(w_i, w_j)), e, lam, mu, mu_s, mode, way, near, unit_mass)
 
 
 def output(c, e, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near):

@@ -212,8 +212,14 @@ def friction_of_one(c, n, grain, r_i, v_i, w_i, lam, grip, mode, way, near):
     return friction(c, n, grain, r_i, v_i, w_i, *other, lam, grip, mode, way, near)[0]
 
 
-def switch(gap, c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, hold, mode, way, near):
-    """What ends a mode where it is negative: gap, normal force; slip, rest of a cone."""
+def switch(
+    gap, c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, hold, mode, way, near, unit_mass
+):
+    """What ends a mode where it is negative: gap, normal force; slip, rest of a cone.
+
+    Forces are divided by the mass ``unit_mass``: a rest that is rounding (formulations/switches.py)
+    is so in scenes of milligrams as well.
+    """
     normal, tangential = forces(
         c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, mode, way, near
     )
@@ -224,19 +230,21 @@ def switch(gap, c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, hold, mode
         part = hold[0] / where(hold[1] > 0.0, hold[1], 1.0)
         held_by = (dot(tangential, first), part * dot(tangential, second), 0.0)
     slides = where(mu > 0.0, dot(slip, unit(across(way, n))), 1.0)
-    sticks = where(mu_s > 0.0, mu_s * normal - sqrt(dot(held_by, held_by)), 1.0)
+    rest = (mu_s * normal - sqrt(dot(held_by, held_by))) / unit_mass
+    sticks = where(mu_s > 0.0, rest, 1.0)
     return (
-        where(closed(mode), normal, gap),
+        where(closed(mode), normal / unit_mass, gap),
         where(held(mode), sticks, where(closed(mode), slides, 1.0)),
     )
 
 
 def switch_within(
-    gap, reach, c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, hold, mode, way, near
-):
+    gap, reach, c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, hold, mode, way, near,
+    unit_mass,
+):  # fmt: skip
     """The same of surfaces that end: the reach as well, of what is closed."""
     ends, slips = switch(
-        gap, c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, hold, mode, way, near
+        gap, c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, hold, mode, way, near, unit_mass
     )
     open_, held_within = where(reach < 0.0, APART, ends), where(reach < ends, reach, ends)
     return where(closed(mode), held_within, open_), slips
@@ -298,9 +306,9 @@ def turning_friction(n, mode, near):
     return (_ZERO, given), (_ZERO, neg(given))
 
 
-def turning_switch(gap, n, lam, mode, near):
+def turning_switch(gap, n, lam, mode, near, unit_mass):
     """What ends a mode where it is negative: the gap, or the moment."""
-    return where(closed(mode), moment(n, lam, mode, near), gap), 1.0
+    return where(closed(mode), moment(n, lam, mode, near) / unit_mass, gap), 1.0
 
 
 def turning_output(gap, n, lam, mode, near):

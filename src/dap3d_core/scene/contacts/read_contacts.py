@@ -32,6 +32,10 @@ from dap3d_core.scene.validate.shapes import Shape, height_field, mesh_file
 from dap3d_core.scene.validate.types import Types
 from dap3d_core.scene.validate.validated_scene import Instance
 
+#: Contacts of bodies of that mass, kg, or more measure forces in newtons; the least mass by which
+#: one measures them, as a part of the largest of the scene.
+ORDINARY_MASS, LIGHTEST_PART = 0.1, 1e-6
+
 
 def read_collisions(
     report: Collector, shapes: Sequence[Shape], index: Mapping[str, int], joints: list[Instance],
@@ -378,6 +382,21 @@ def read_friction(
                     what = f"is missing, which friction in {joint.type_info.type.keyword} needs"
                     report.add((*key, "radius"), MISSING, what)
             found.append(Instance(name, grip, joint.bodies, (), values))
+    return found
+
+
+def with_unit_mass(contacts: Sequence[Instance], mass: Floats) -> list[Instance]:
+    """Contacts with the mass that their forces are measured by, that of the lighter body.
+
+    It is a power of ten, and 1 kg of ordinary ones. What is far lighter than the scene may carry
+    the rest of it, with forces of that rounding.
+    """
+    found, least = [], LIGHTEST_PART * float(np.max(mass))
+    for one in contacts:
+        masses = [float(mass[k - 1]) for k in one.bodies if k > 0]
+        lighter = max(least, min(masses, default=1.0))
+        unit = 1.0 if lighter >= ORDINARY_MASS else float(10.0 ** np.round(np.log10(lighter)))
+        found.append(attrs.evolve(one, values=one.values | {"unit_mass": unit}))
     return found
 
 

@@ -60,6 +60,10 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     check_settings(report, scene.simulation, bodies.body_names, ("simulation",))
     report.raise_mistakes()
 
+    if contacts:
+        from dap3d_core.scene.contacts.read_contacts import with_unit_mass
+
+        contacts = with_unit_mass(contacts, bodies.mass)
     types.note_unused_file()
     acting = [*joints, *forces, *contacts]
     _note_loose_bodies(report, bodies, acting, collisions)

@@ -1,5 +1,7 @@
 """Kernels of every contact: what ends a mode."""
 
+import pytest
+
 import dap3d_core as dap
 
 
@@ -23,3 +25,23 @@ def test_a_heavy_ball_lifts_off_in_no_more_steps_than_a_light_one():
     assert heavy.events[-1].kind == "lift"
     assert abs(heavy.events[-1].t - light.events[-1].t) < 1e-12
     assert heavy.stats.steps <= light.stats.steps + 1
+
+
+@pytest.mark.parametrize(("mass", "beside"), [(1e-9, 1e-9), (1e-6, 10.0)])
+def test_a_light_box_slips_when_a_heavy_one_does(mass, beside):
+    # pulled by 2 N/s for each kg, it slips at 0.4 of its weight
+    scene = dap.Scene(name="slip")
+    scene.add_force("weight")
+    scene.add_body("box", mass=mass, Jp=[0.01 * mass] * 3, r=[0.0, 0.0, 0.05])
+    scene.add_body("sled", mass=beside, Jp=[1.0 * beside] * 3, r=[1.0, 0.0, 0.05],
+                   r_dot=[0.1, 0.0, 0.0])  # fmt: skip
+    scene.add_point("far", "ground", [1.0, 0.0, 0.05])
+    at = {"P_i": "sled.O", "P_j": "far", "a_j": "ground.x"}
+    scene.add_joint("tran", **at)
+    scene.add_function("a", "moved", coeff=[0.0, 0.1, 0.0])
+    scene.add_joint("drive-tran", function="moved", **at)
+    scene.add_force("ptp", P_i="sled.O", P_j="box.O", k=20.0 * mass, l0=1.0)
+    size = [0.4, 0.3, 0.1]
+    scene.add_contact("box_plane", "floor", P_i="box.O", size=size, mu=0.3, mu_s=0.4)
+    result = dap.simulate(scene, t_end=2.0, dt=2.0, rtol=1e-11)
+    assert next(e.t for e in result.events if e.kind == "slip") == pytest.approx(1.962, abs=1e-9)
