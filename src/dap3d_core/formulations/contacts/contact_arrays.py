@@ -138,6 +138,7 @@ class ContactArrays(Arrays):
     e_now: Floats
     taking: IntegerMatrix  # (rounds, m) 1 of those that take part, with restitution; -1: slip ends
     restitution: Matrix
+    slips: Matrix  # (rounds m, 3) slip before each of them
     role: Integers  # of ``lift``: 1 of what it holds, 2 of what it lets not be less than ``least``
     values: Floats
     least: Floats
@@ -225,6 +226,7 @@ def contact_arrays(
         feels=np.zeros((m, m), dtype=np.int64),
         taking=np.zeros((rounds, m), dtype=np.int64),
         restitution=np.zeros((rounds, m)),
+        slips=np.zeros((rounds * m, 3)),
         direction=np.zeros(3),
         frames=np.zeros((m, 3, 3)),
         reaction=np.zeros((rows, n)),

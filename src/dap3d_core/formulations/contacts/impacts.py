@@ -25,6 +25,8 @@ DEPENDENT = 1e-12
 AT_REST = 1e-9
 #: Part of the terms of a slip that may be rounding of it.
 CANCELLED = 1e-15
+#: Times the changes of slips nearby to which slips are raised, so that the same happens there.
+FARTHER = 1e3
 #: Rounds of one instant; in the last one all that touches stops.
 ROUNDS = 500
 #: Height of a bounce, as a part of the length of the scene, from which on what bounces is held:
@@ -169,6 +171,8 @@ def remember_round(s: ContactArrays) -> None:
     if s.round_count < s.taking.shape[0]:
         for c in range(s.state.shape[0]):
             s.taking[s.round_count, c], s.restitution[s.round_count, c] = 0, s.e_now[c]
+            for i in range(3):
+                s.slips[s.round_count * s.state.shape[0] + c, i] = s.slip[c, i]
         for k in range(s.touching_count):
             s.taking[s.round_count, s.touching[k]] = 1
         s.round_count += 1
@@ -265,6 +269,39 @@ def hold_low(s: ContactArrays, system: System) -> None:
 
 
 @compiled
+def repeat_impulses(s: ContactArrays, first: int) -> None:
+    """Impulses x of a round that is kept, from row ``first`` of ``slips`` on, by the slip nearby.
+
+    What approached slowly may open nearby, and has no impulse there. All impulses grow as slips do,
+    x(f v) = f x(v): so x(f v + dv) - (f - 1) x(v) has the derivatives of x(v + dv), and for a large
+    f all slides or sticks in it as in x(v).
+    """
+    far, slowest, n = 0.0, 1.0, 3 * s.touching_count
+    for k in range(s.touching_count):
+        c = s.touching[k]
+        old = s.slips[first + c]
+        if s.gapless[c] == 0.0 and old[0] < -AT_REST * s.length[c]:
+            slowest = min(slowest, -old[0])
+        for i in range(3):
+            far = max(far, abs(s.slip[c, i] - old[i]))
+            s.slip[c, i], old[i] = old[i], s.slip[c, i]
+    put_impulses(s, s.e_now)
+    more = FARTHER * far / slowest
+    for i in range(n):
+        s.right[i] = more * s.x[i]
+    for k in range(s.touching_count):
+        c = s.touching[k]
+        for i in range(3):
+            s.slip[c, i] = more * s.slip[c, i] + s.slips[first + c, i]
+    put_impulses(s, s.e_now)
+    for i in range(n):
+        s.x[i] -= s.right[i]
+    for k in range(s.touching_count):
+        for i in range(3):
+            s.slip[s.touching[k], i] = s.slips[first + s.touching[k], i]
+
+
+@compiled
 def repeat_rounds(s: ContactArrays, system: System) -> None:
     """The rounds that are kept once more, of the same contacts, from other velocities."""
     for c in range(s.state.shape[0]):
@@ -277,7 +314,7 @@ def repeat_rounds(s: ContactArrays, system: System) -> None:
                 s.touching[s.touching_count] = c
                 s.touching_count += 1
         if s.restitution[q, 0] >= 0.0:
-            put_impulses(s, s.e_now)
+            repeat_impulses(s, q * s.state.shape[0])
             act(s, system)
         elif stop_slip(s):
             act(s, system)

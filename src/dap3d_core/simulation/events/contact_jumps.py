@@ -53,7 +53,7 @@ STIFF_SLIP = 1e-4
 CHANGES = {(0, 1): "touch", (0, 2): "touch", (1, 0): "lift", (2, 0): "lift", (1, 2): "stick",
            (2, 1): "slip"}  # fmt: skip
 #: What was decided at an instant, by which it is decided once more at states nearby.
-DECIDED = ("taking", "restitution", "is_low", "stops", "mode", "way", "near")
+DECIDED = ("taking", "restitution", "slips", "is_low", "stops", "mode", "way", "near")
 
 
 class ContactJumps(Jumps):
