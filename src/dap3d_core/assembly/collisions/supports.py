@@ -121,7 +121,7 @@ def near_support(
         total = shapes.corners[k, 1]
     best, e, f = -1e300, 1.0, 0.0
     for turn in range(2):  # the farthest first, then what is nearly as far
-        for c in range(total):
+        for c in range(2 if turn == 0 and what == CYLINDER and across > FLAT else total):
             p, q, s = 0.0, 0.0, 0.0
             if what == HULL:
                 v = shapes.vertices[shapes.corners[k, 0] + c]

@@ -163,14 +163,23 @@ def put_turned_bias(c: int, s: StepArrays) -> None:
 
 @compiled
 def place_poses(y: Floats, s: StepArrays) -> None:
-    """Take poses from an integrated state, and with them moments of inertia in global axes."""
+    """Take poses from an integrated state."""
     s.poses[0, 3] = 1.0
     for b in range(1, s.poses.shape[0]):
         pose, first = s.poses[b], 7 * (b - 1)
         for k in range(7):
             pose[k] = y[first + k]
-        turn_tensor(pose, s.Jp[b], s.spin[b])
-        turn_tensor(pose, s.Jp_inverse[b], s.spin_inverse[b])
+
+
+@compiled
+def put_inertia(s: StepArrays) -> None:
+    """Put moments of inertia of the bodies as placed, in global axes."""
+    A = s.turned
+    for b in range(1, s.poses.shape[0]):
+        for k in range(3):
+            A[3 * k], A[3 * k + 1], A[3 * k + 2] = axes_of(s.poses[b], k)
+        turn_tensor(A, s.Jp[b], s.spin[b])
+        turn_tensor(A, s.Jp_inverse[b], s.spin_inverse[b])
 
 
 @compiled
@@ -186,16 +195,15 @@ def axes_of(p: Floats, k: int) -> tuple[float, float, float]:
 
 
 @compiled
-def turn_tensor(pose: Floats, J: Floats, out: Floats) -> None:
+def turn_tensor(A: Floats, J: Floats, out: Floats) -> None:
     """Put A J A^T of a symmetric J, by rows."""
     for i in range(3):
-        a, b, c = axes_of(pose, i)
+        a, b, c = A[3 * i], A[3 * i + 1], A[3 * i + 2]
         d = a * J[0] + b * J[3] + c * J[6]
         e = a * J[1] + b * J[4] + c * J[7]
         f = a * J[2] + b * J[5] + c * J[8]
         for k in range(3):
-            u, v, w = axes_of(pose, k)
-            out[3 * i + k] = d * u + e * v + f * w
+            out[3 * i + k] = d * A[3 * k] + e * A[3 * k + 1] + f * A[3 * k + 2]
 
 
 @compiled

@@ -9,7 +9,7 @@ one does, and each is solved as if it were alone.
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators.moreau.arrays import CONE, StepArrays, step_arrays
-from dap3d_core.integrators.moreau.contact_set import put_speeds
+from dap3d_core.integrators.moreau.contact_set import put_inertia, put_speeds
 from dap3d_core.integrators.moreau.gauss_seidel import (
     copy_impulses,
     sweep_bodies,
@@ -55,10 +55,9 @@ FEW, RESIDUAL_ROUNDING = 100, 1e-14
 #: Part of the largest momentum that the velocities of joints have rounding of, over that asked for:
 #: where nothing presses, joints pull by that rounding alone.
 LEAST_IMPULSE = 1e-3
-#: Weights times the masses that rows feel: at first, and at most in the problem of contacts alone.
-WEIGHT, MOST_WEIGHT = 1e5, 1e10
-#: Passes in which joints answer: what hardly moves must not be felt as if it gave.
-FELT = 2
+#: Weights times the masses that rows feel, at first; in the problem of contacts alone at first, and
+#: at most.
+WEIGHT, ALONE_WEIGHT, MOST_WEIGHT = 1e5, 1e7, 1e10
 #: A round helps where it leaves less than this part of the residual. Where nothing else has led to
 #: a solution, rounds that leave less than the next ask for a larger weight: what hardly moves is
 #: felt with that alone. Rounds at most.
@@ -68,8 +67,8 @@ INNER = 1e-2
 #: A residual from which a round that does not help is the last.
 SETTLED = 2e-14
 #: Of contacts held between bodies that joints guide: rounds of sweeps and Newton's method at most;
-#: passes in which joints are met; part of its own below which a contact cannot move.
-HELD_ROUNDS, MET, HELD = 3, 3, 1e-12
+#: passes in which joints answer, and are met; part of its own below which a contact cannot move.
+HELD_ROUNDS, ANSWERED, MET, HELD = 3, 2, 3, 1e-12
 #: Residual above which rows of light bodies are taken as those of what these carry.
 CARRIED = 1e-12
 
@@ -81,7 +80,8 @@ def arrays_of(evaluator: Evaluator, size: int, remembered: int) -> StepArrays:
 
 @compiled
 def prepare_problem(s: StepArrays) -> None:
-    """What contacts feel of the masses: J M^-1, and its diagonal blocks."""
+    """What contacts feel of the masses as placed: J M^-1, and its diagonal blocks."""
+    put_inertia(s)
     for c in range(s.contact_count):
         J, moved, own = s.J[c], s.moved[c], s.own[c]
         for side in range(6):
@@ -194,6 +194,8 @@ def solve_group(s: StepArrays, tolerance: float) -> bool:
             if not factor_joints(s):
                 return False
             s.residual = newton(s, aim, True)
+            if s.residual <= aim:
+                return True
         if s.residual > aim:
             if not lay_out(s, s.dense_size):
                 return False
@@ -268,7 +270,7 @@ def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
     for _ in range(HELD_ROUNDS):
         if not factor_joints(s):
             return False
-        put_felt(s, MET)
+        put_felt(s, ANSWERED)
         for p in range(m):
             c = s.chosen[p]
             own = s.own_held[c]
@@ -314,13 +316,13 @@ def newton(s: StepArrays, tolerance: float, is_reduced: bool, raises: bool = Fal
     """
     if is_reduced:
         meet_joints(s)
-        meet_joints(s)
     else:
         put_velocities(s, s.v)
     left, weight, s.factored = residual_of(s, s.v, 0.0), WEIGHT, 0.0
     most = MOST_WEIGHT if is_reduced else WEIGHT
     if is_reduced and left > tolerance:
-        put_felt(s, FELT if tolerance < NEAR else 1)
+        weight = ALONE_WEIGHT
+        put_felt(s, 1)
     for _ in range(ROUNDS):
         if left <= tolerance:
             break

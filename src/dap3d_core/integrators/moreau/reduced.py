@@ -12,7 +12,8 @@ three unknowns a contact.
 import math
 
 from dap3d_core.integrators.moreau.arrays import ALONE, CONE, StepArrays
-from dap3d_core.integrators.moreau.contact_set import put_speeds, velocity_of
+from dap3d_core.integrators.moreau.contact_set import put_speeds
+from dap3d_core.integrators.moreau.impulses import STICKS, mode_of
 from dap3d_core.integrators.moreau.matrix import (
     assemble,
     factor,
@@ -70,6 +71,8 @@ def factor_joints(s: StepArrays) -> bool:
 def put_felt(s: StepArrays, passes: int) -> None:
     """Put how contacts feel each other with what joints ``answer``.
 
+    By velocities v with answers a, both missed by e, it is J v + a D v: missed by e^2 alone.
+
     passes: by which joints are met, each to some 1e-6 of the one before.
     """
     m = s.chosen_count
@@ -79,8 +82,10 @@ def put_felt(s: StepArrays, passes: int) -> None:
             column = 3 * p + r
             for n in range(s.row_count):
                 s.lead[s.rows[n]] = s.answer[s.rows[n], column] = 0.0
-            if r > 0 and s.kind[c] == CONE and s.mu[c] == 0.0 and s.x[c, r] == 0.0:
-                continue  # it never has an impulse
+            for k in range(3 * m):
+                s.felt[column, k] = s.felt[k, column] = 0.0
+            if is_idle(s, c, r):
+                continue
             for turn in range(passes):
                 clear(s, s.delta)
                 for side in range(2):
@@ -92,14 +97,32 @@ def put_felt(s: StepArrays, passes: int) -> None:
                 solve_bodies(s)
                 for n in range(s.row_count):
                     k = s.rows[n]
-                    s.lead[k] -= STIFF * s.s[k] * speed_of(s, k, s.delta)
+                    s.pull[k] = speed_of(s, k, s.delta)
+                    s.lead[k] -= STIFF * s.s[k] * s.pull[k]
             for n in range(s.row_count):
                 s.answer[s.rows[n], column] = s.lead[s.rows[n]]
-            for q in range(p, m):
-                u0, u1, u2 = velocity_of(s, s.chosen[q], s.delta)
-                s.felt[3 * q, column] = s.felt[column, 3 * q] = u0
-                s.felt[3 * q + 1, column] = s.felt[column, 3 * q + 1] = u1
-                s.felt[3 * q + 2, column] = s.felt[column, 3 * q + 2] = u2
+            for q in range(p + 1):
+                for i in range(3 if q < p else r + 1):
+                    if not is_idle(s, s.chosen[q], i):
+                        put_mutual(s, q, i, column)
+
+
+@compiled
+def is_idle(s: StepArrays, c: int, r: int) -> bool:
+    """True of a tangent along which a contact never has an impulse."""
+    return r > 0 and s.kind[c] == CONE and s.mu[c] == 0.0 and s.x[c, r] == 0.0
+
+
+@compiled
+def put_mutual(s: StepArrays, q: int, i: int, column: int) -> None:
+    """Put what direction i of a contact and that of a column, solved last, feel of each other."""
+    c, row, felt = s.chosen[q], 3 * q + i, 0.0
+    J, first, second = s.J[c], s.delta[s.bodies[c, 0]], s.delta[s.bodies[c, 1]]
+    for k in range(6):
+        felt += J[12 * i + k] * first[k] + J[12 * i + 6 + k] * second[k]
+    for n in range(s.row_count):
+        felt += s.answer[s.rows[n], row] * s.pull[s.rows[n]]
+    s.felt[row, column] = s.felt[column, row] = felt
 
 
 @compiled
@@ -171,7 +194,7 @@ def solve_reduced(s: StepArrays, weight: float, tolerance: float) -> bool:
 
     Weights multiply the rounding of what impulses change by, and not that of impulses.
     """
-    is_far = False
+    holds, is_far = True, False
     for q in range(s.chosen_count):
         c = s.chosen[q]
         s.push[c, 0] = s.push[c, 1] = s.push[c, 2] = 0.0
@@ -179,10 +202,15 @@ def solve_reduced(s: StepArrays, weight: float, tolerance: float) -> bool:
     for _ in range(PASSES):
         if merit <= aim_of(s, tolerance):
             break
-        better = try_reduced(s, weight, merit, 1.0)
+        better = try_reduced(s, weight, merit, 1.0, True) if holds else -1.0
+        if better < 0.0:
+            if holds:
+                put_missing(s, s.push, weight)
+            better = try_reduced(s, weight, merit, 1.0, False)
+        holds = False
         if better < 0.0:
             put_missing(s, s.push, weight)
-            better = try_reduced(s, weight, merit, 0.0)
+            better = try_reduced(s, weight, merit, 0.0, False)
         if better < 0.0 and is_far:
             break
         if better < 0.0:
@@ -233,16 +261,19 @@ def put_missing(s: StepArrays, change: Floats, weight: float) -> float:
 
 
 @compiled
-def try_reduced(s: StepArrays, weight: float, merit: float, feels: float) -> float:
+def try_reduced(s: StepArrays, weight: float, merit: float, feels: float, holds: bool) -> float:
     """Take a Newton step, or a part of it; the new merit, -1 if none is better.
 
-    feels: as of ``try_pass``.
+    feels: as of ``try_pass``. holds: what pushes is taken to do so still, whatever velocities,
+    times a large weight, say; no parts then.
     """
     m, n, K, step = s.chosen_count, 3 * s.chosen_count, s.small, s.small_step
     for q in range(m):
         c = s.chosen[q]
         B, z, part = s.B[c], s.z[c], weight * s.r[c]
         put_slopes(z, feels * s.mu[c], s.rim[c], s.kind[c], B)
+        if holds and s.kind[c] == CONE and s.x[c, 0] > 0.0:
+            hold(s, c)
         for r in range(3):
             at, row = n * (3 * q + r), s.felt
             for k in range(n):
@@ -264,7 +295,7 @@ def try_reduced(s: StepArrays, weight: float, merit: float, feels: float) -> flo
     factor_square(K, s.exchanged, n)
     solve_square(K, s.exchanged, step, n)
     part = 1.0
-    for _ in range(CUTS):
+    for _ in range(1 if holds else CUTS):
         for q in range(m):
             c = s.chosen[q]
             for k in range(3):
@@ -278,6 +309,20 @@ def try_reduced(s: StepArrays, weight: float, merit: float, feels: float) -> flo
             return found
         part *= 0.5
     return -1.0
+
+
+@compiled
+def hold(s: StepArrays, c: int) -> None:
+    """Take a contact to push, and to stick or slide, as its impulse does: slopes, ``missing``."""
+    x, z, held, missing = s.x[c], s.z[c], s.turned, s.missing[c]
+    size, rim = math.sqrt(z[1] * z[1] + z[2] * z[2]), s.mu[c] * x[0]
+    held[0], held[1], held[2] = x[0], z[1], z[2]
+    if mode_of(s, c) == STICKS:
+        rim = size
+    put_slopes(held, s.mu[c], rim, CONE, s.B[c])
+    part = s.mu[c] * z[0] / size if rim < size else 1.0
+    missing[0] = x[0] - z[0]
+    missing[1], missing[2] = x[1] - part * z[1], x[2] - part * z[2]
 
 
 @compiled

@@ -213,17 +213,16 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         for b in range(n + 1):
             copy(s.end[b], s.free[b])
         return True
-    if s.declared_gap.size == 0 and s.y.size > 0:
-        evaluate_rows(work.t, y, s, system, loops)
     any_collides = put_bias(s)
     if s.declared_law.size > 0 and not find_grips(work.t, s, system, loops):
         work.t_stop, work.status, s.stage = work.t, DRIVEN, 0
         return False
     order_memory(work.memory, s.slots)
-    if stay_closed(work, s) and not turn_rows(
-        work.t + 0.5 * s.h, put_middle(work, s), s, system, loops
-    ):
-        return False
+    if stay_closed(work, s):
+        if not turn_rows(work.t + 0.5 * s.h, put_middle(work, s), s, system, loops):
+            return False
+    elif s.declared_gap.size == 0 and s.y.size > 0:
+        evaluate_rows(work.t, y, s, system, loops)
     for c in range(s.touch_count if s.resistance_count > 0 else 0):
         put_resistances(c, s)
     recall(work, s)
