@@ -4,9 +4,10 @@
 # mypy: disable-error-code="no-any-return"
 
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
-from dap3d_core.formulations.contacts.forces import largest_entry, pressing, put_sizes, solve_forces
+from dap3d_core.formulations.contacts.forces import largest_entry, put_open, put_rates, put_sizes
+from dap3d_core.formulations.contacts.inside import come_inside, rim_of
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.linear.least_squares import factor_least, solve_least
+from dap3d_core.linear.least_squares import factor_least, put_null, solve_least
 
 #: Part of the largest entry of A below which rows depend on each other.
 DEPENDENT = 1e-12
@@ -15,15 +16,6 @@ DEPENDENT = 1e-12
 HELD, OF_REST, RATE_ROUNDING = 1e-9, 0.05, 1e-13
 #: Part of the largest force that is rounding of one.
 FORCE_ROUNDING = 1e-12
-#: How many parts of their cones within which contacts that share what they carry may be to stay,
-#: each leaving half of what the one before leaves: what they carry reaches its limit with so much
-#: left, 1e-9. And how many normal forces, each half of the one before.
-PARTS = 30
-#: Normal force that each of them has, as a part of an equal share, where it can: what carried
-#: nothing would be at its limit at once.
-LEAST = 0.2
-#: Tries of a cone problem that may have no solution.
-FEW = 3
 
 
 @compiled
@@ -55,85 +47,85 @@ def put_own_rows(s: ContactArrays) -> int:
 
 
 @compiled
-def left_of(k: int) -> float:
-    """What the part of their cones of a number leaves."""
-    left = 1.0
-    for _ in range(k + 1):
-        left *= 0.5
-    return left
-
-
-@compiled
 def hold_inside(s: ContactArrays) -> bool:
     """Forces ``inner`` well within the cones of closed contacts that share, and hold, if any."""
-    for k in range(3 * s.closed_count):
-        s.cone.x[k] = 0.0
     resists = False
     for k in range(s.closed_count):
-        s.slipping[s.closed[k]] = 0
         resists |= s.under[s.closed[k]] >= 0
-    if resists and are_held_within(s, 0, 0, 0.0):  # they carry nothing that others can
-        return True
-    for k in range(3 * s.closed_count):
-        s.cone.x[k] = 0.0
-    if are_held_within(s, 0, 0):  # as a rule
-        return True
-    for k in range(3 * s.closed_count):
-        s.cone.x[k] = 0.0
-    if not are_held_within(s, PARTS - 1, PARTS - 1):
-        return False
-    part = bring_in(s, -1)
-    bring_in(s, min(part + 1, PARTS - 1))
-    return True
+    # as a rule what resists rolling carries nothing that others can
+    return (resists and are_held_inside(s, False)) or are_held_inside(s, True)
 
 
 @compiled
-def bring_in(s: ContactArrays, part: int) -> int:
-    """The first part of the cones that holds; or, within one, the first normal force that does."""
-    low, high = 0, PARTS - 2
-    while low <= high:  # what one allows, so does every later one
-        k = (low + high) // 2
-        for q in range(3 * s.closed_count):
-            s.cone.x[q] = s.inner[q]
-        if are_held_within(s, k if part < 0 else part, PARTS - 1 if part < 0 else k):
-            high = k - 1
-        else:
-            low = k + 1
-    return low
+def are_held_inside(s: ContactArrays, resisting: bool) -> bool:
+    """True if forces within the cones hold; these are ``inner`` then.
 
-
-@compiled
-def are_held_within(s: ContactArrays, part: int, least: int, resisting: float = 1.0) -> bool:
-    """True if forces within a part of the cones hold; these are ``inner`` then.
-
-    least: the number of the normal force that each has at least.
-    resisting: 0 where what resists rolling is to carry nothing.
+    resisting: what resists rolling carries something.
     """
-    load, count, left = 0.0, 0, left_of(part)
-    for k in range(s.closed_count):
-        c = s.closed[k]
-        if s.alone[c] == 0:
-            load, count = max(load, -s.free[3 * c] / s.cone.A[3 * k, 3 * k]), count + 1
-    normal = LEAST * left_of(least) * load / count if count > 1 else 0.0
-    solve_forces(s, 1.0 - left, FEW, normal, resisting)
-    x, A, big = s.cone.x, s.cone.A, put_sizes(s, True)
-    for q in range(put_own_rows(s)):
+    put_open(s)
+    free = put_least(s, resisting)
+    if free < 0 or not come_inside(s, free):
+        return False
+    put_rates(s)
+    n, big = put_own_rows(s), put_sizes(s, True)
+    for q in range(n):
         k = s.rows[q] // 3
-        c = s.closed[k]
-        own = max(A[3 * k, 3 * k], A[3 * k + 1, 3 * k + 1], A[3 * k + 2, 3 * k + 2])
-        carried = s.mu_s[c] * pressing(s, k)
-        rest = OF_REST * left * own * carried + RATE_ROUNDING * big
+        row = 3 * k
+        own = max(s.cone.A[row, row], s.cone.A[row + 1, row + 1], s.cone.A[row + 2, row + 2])
+        rest = OF_REST * own * rim_of(s, k) + RATE_ROUNDING * big
         if not abs(s.rates[s.rows[q]]) <= min(HELD * s.sizes[k], rest):
             return False
-    if not is_left_to_rows(s, left):
+    if not is_left_to_rows(s):
         return False
     for k in range(3 * s.closed_count):
-        s.inner[k] = x[k]
+        s.inner[k] = s.cone.x[k]
     return True
 
 
 @compiled
-def is_left_to_rows(s: ContactArrays, left: float) -> bool:
+def put_least(s: ContactArrays, resisting: bool) -> int:
+    """The least forces ``cone.x`` that hold, if any, and vectors ``cone.K`` of what may be added.
+
+    Returns how many of these there are; -1 where nothing holds.
+    """
+    n, A, x, K, count = put_own_rows(s), s.cone.A, s.cone.x, s.cone.K, 0
+    for k in range(3 * s.closed_count):
+        x[k] = 0.0
+    for q in range(n):
+        s.right[q] = -s.cone.b[s.rows[q]]
+        for i in range(n if carries(s, s.rows[q], resisting) else 0):
+            s.B[i, count] = A[s.rows[i], s.rows[q]]
+        count += carries(s, s.rows[q], resisting)
+    least = DEPENDENT * largest_entry(A, 3 * s.closed_count)
+    rank = factor_least(s.B, n, count, 0.0, least, s.w, s.order)
+    for k in range(3 * s.closed_count):
+        for i in range(count - rank + 1):
+            K[k, i] = 0.0
+    solve_least(s.B, n, count, rank, s.w, s.order, s.right, s.x)
+    for i in range(-1, count - rank):
+        if i >= 0:
+            put_null(s.B, count, rank, s.w, s.order, i, s.x)
+        count = 0
+        for q in range(n):
+            if carries(s, s.rows[q], resisting):
+                if i >= 0:
+                    K[s.rows[q], i] = s.x[count]
+                else:
+                    x[s.rows[q]] = s.x[count]
+                count += 1
+    return count - rank if rank > 0 else -1
+
+
+@compiled
+def carries(s: ContactArrays, row: int, resisting: bool) -> bool:
+    """True of a row of closed contacts, one of those along which they act, that may carry."""
+    c = s.closed[row // 3]
+    bounded = s.alone[c] == 0 or (s.mu_s[c] > 0.0 and (resisting or s.under[c] < 0))
+    return bounded and (row % 3 < 2 or s.ratio_s[c] > 0.0)
+
+
+@compiled
+def is_left_to_rows(s: ContactArrays) -> bool:
     """True if rows end what is left of rates by little of what the cones leave.
 
     Of weak rows that is more force than their own mobility tells.
@@ -148,9 +140,7 @@ def is_left_to_rows(s: ContactArrays, left: float) -> bool:
     for k in range(3 * s.closed_count):
         big = max(big, abs(s.cone.x[k]))
     for q in range(n):
-        k = s.rows[q] // 3
-        carried = s.mu_s[s.closed[k]] * pressing(s, k)
-        if carried > 0.0 and not abs(s.right[q]) <= OF_REST * left * carried + FORCE_ROUNDING * big:
+        if not abs(s.right[q]) <= OF_REST * rim_of(s, s.rows[q] // 3) + FORCE_ROUNDING * big:
             return False
     return True
 
