@@ -131,9 +131,7 @@ def solve_least(
 
 
 @compiled
-def put_null(
-    A: Floats, n: int, rank: int, w: Floats, order: Integers, k: int, x: Floats
-) -> None:
+def put_null(A: Floats, n: int, rank: int, w: Floats, order: Integers, k: int, x: Floats) -> None:
     """Put vector k of an orthonormal basis of those x (n,) with A x = 0; A, w, order: factors."""
     for c in range(n):
         x[order[c]] = 1.0 if c == rank + k else 0.0

@@ -118,7 +118,7 @@ def add_sliding(s: ContactArrays) -> bool:
 
 @compiled
 def put_open(s: ContactArrays) -> None:
-    """Rates of closed contacts without their forces, but with friction that is given, ``cone.b``."""
+    """Rates of closed contacts without their forces, with friction that is given: ``cone.b``."""
     n, cone = 3 * s.closed_count, s.cone
     for k in range(n):
         cone.b[k] = s.free[3 * s.closed[k // 3] + k % 3]
