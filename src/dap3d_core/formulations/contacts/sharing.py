@@ -316,7 +316,7 @@ def add_cone(s: ContactArrays, k: int, free: int, n: int, t: float) -> None:
 
 @compiled
 def solve_definite(s: ContactArrays, n: int) -> float:
-    """Put ``cone.step``, -H^-1 g, by Cholesky's factors; returns the decrement, (g H^-1 g)^(1/2)."""
+    """Put ``cone.step``, -H^-1 g, by Cholesky; returns the decrement, (g H^-1 g)^(1/2)."""
     H, g, x, square = s.cone.S, s.cone.F, s.cone.step, 0.0
     for j in range(n):
         own = H[j, j]
