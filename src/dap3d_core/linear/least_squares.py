@@ -127,15 +127,28 @@ def solve_least(
         b[k] = s / A[k, k]
     for c in range(n):
         x[order[c]] = b[c] if c < rank else 0.0
-    if rank < n:
-        for k in range(rank):
-            s = x[order[k]]
-            for c in range(rank, n):
-                s += A[k, c] * x[order[c]]
-            s *= w[1, k]
-            x[order[k]] -= s
-            for c in range(rank, n):
-                x[order[c]] -= s * A[k, c]
+    unfold(A, n, rank, w, order, x)
+
+
+@compiled
+def put_null(A: Floats, n: int, rank: int, w: Floats, order: Integers, k: int, x: Floats) -> None:
+    """Put vector k of an orthonormal basis of those x (n,) with A x = 0; A, w, order: factors."""
+    for c in range(n):
+        x[order[c]] = 1.0 if c == rank + k else 0.0
+    unfold(A, n, rank, w, order, x)
+
+
+@compiled
+def unfold(A: Floats, n: int, rank: int, w: Floats, order: Integers, x: Floats) -> None:
+    """Undo ``fold`` in x (n,)."""
+    for k in range(rank if rank < n else 0):
+        s = x[order[k]]
+        for c in range(rank, n):
+            s += A[k, c] * x[order[c]]
+        s *= w[1, k]
+        x[order[k]] -= s
+        for c in range(rank, n):
+            x[order[c]] -= s * A[k, c]
 
 
 @compiled

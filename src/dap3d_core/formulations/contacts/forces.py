@@ -117,21 +117,11 @@ def add_sliding(s: ContactArrays) -> bool:
 
 
 @compiled
-def solve_forces(
-    s: ContactArrays, part: float, tries: int, least: float = 0.0, resisting: float = 1.0
-) -> bool:
-    """Forces of closed contacts into ``cone.x``, which is where it begins, and ``rates``.
-
-    False where there are none; of fewer tries than all that is left open.
-
-    part: of the cones; contacts that are ``slipping`` have mu, not mu_s.
-    least: normal force of each, N.
-    resisting: the same part again of what resists rolling.
-    """
+def put_open(s: ContactArrays) -> None:
+    """Rates of closed contacts without their forces, with friction that is given: ``cone.b``."""
     n, cone = 3 * s.closed_count, s.cone
-    cone.count = s.closed_count
     for k in range(n):
-        cone.b[k], cone.noise[k] = s.free[3 * s.closed[k // 3] + k % 3], 0.0
+        cone.b[k] = s.free[3 * s.closed[k // 3] + k % 3]
     for k in range(s.closed_count):
         c = s.closed[k]
         for i in range(n if s.slides[c] != 0 else 0):
@@ -142,30 +132,44 @@ def solve_forces(
                 cone.b[i] -= s.load[c] * s.mu[c] * along
             elif s.alone[c] != 0:  # in its first column is what a load of one does
                 cone.b[i] += s.load[c] * row[0]
-        mu = s.mu[c] if s.slipping[c] != 0 else s.mu_s[c]
-        cone.mu[k] = 0.0 if s.slides[c] != 0 else part * mu
-        cone.mu[k] *= resisting if s.under[c] >= 0 else 1.0
-        cone.more[k], cone.gapless[k], cone.ratio[k] = s.load[c], s.gapless[c], s.ratio_s[c]
-        if least > 0.0 and s.alone[c] == 0:
-            for i in range(n):
-                cone.b[i] += least * cone.A[i, 3 * k]
-            cone.x[3 * k] -= least
-            cone.more[k] += least
-    left = solve_cone(cone, tries)
-    if left > UNSOLVED and tries == TRIES:
-        for k in range(s.closed_count):
-            s.jams[s.closed[k]] = 1
-        return False
+
+
+@compiled
+def put_rates(s: ContactArrays) -> None:
+    """Rates of closed contacts with their forces; then what slides has its friction, too."""
+    n, cone = 3 * s.closed_count, s.cone
     for i in range(n):
         s.rates[i] = cone.b[i]
         for k in range(n):
             s.rates[i] += cone.A[i, k] * cone.x[k]
     for k in range(s.closed_count):
-        c = s.closed[k]
-        if s.alone[c] == 0:
-            cone.x[3 * k] += least
-        if s.slides[c] != 0:
+        if s.slides[s.closed[k]] != 0:
             put_sliding_force(s, k)
+
+
+@compiled
+def solve_forces(s: ContactArrays, part: float) -> bool:
+    """Forces of closed contacts into ``cone.x``, which is where it begins, and ``rates``.
+
+    False where there are none.
+
+    part: of the cones; contacts that are ``slipping`` have mu, not mu_s.
+    """
+    cone = s.cone
+    cone.count = s.closed_count
+    put_open(s)
+    for k in range(3 * s.closed_count):
+        cone.noise[k] = 0.0
+    for k in range(s.closed_count):
+        c = s.closed[k]
+        mu = s.mu[c] if s.slipping[c] != 0 else s.mu_s[c]
+        cone.mu[k] = 0.0 if s.slides[c] != 0 else part * mu
+        cone.more[k], cone.gapless[k], cone.ratio[k] = s.load[c], s.gapless[c], s.ratio_s[c]
+    if solve_cone(cone, TRIES) > UNSOLVED:
+        for k in range(s.closed_count):
+            s.jams[s.closed[k]] = 1
+        return False
+    put_rates(s)
     return True
 
 
@@ -226,7 +230,7 @@ def begin_to_move(s: ContactArrays, part: float) -> bool:
     while True:
         for k in range(3 * s.closed_count):
             s.cone.x[k] = 0.0
-        if not solve_forces(s, part, TRIES):
+        if not solve_forces(s, part):
             return False
         put_sizes(s, False)
         more = False

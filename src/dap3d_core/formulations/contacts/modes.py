@@ -3,7 +3,6 @@
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
-from dap3d_core.formulations.contacts.cone import TRIES
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.contacts.forces import (
     ZERO,
@@ -194,7 +193,7 @@ def let_leave(s: ContactArrays, count: int) -> None:
         without = s.closed_count
         for k in range(3 * without):
             s.cone.x[k] = 0.0
-        holds = put_matrix(s, True) and solve_forces(s, 1.0, TRIES)
+        holds = put_matrix(s, True) and solve_forces(s, 1.0)
         if not holds or put_returning(s, -ZERO * big) > 0:
             if not holds or without > 0:
                 for k in range(before):

@@ -1,12 +1,26 @@
-"""Contacts that share what they carry: forces well within cones, and rows that do not hold."""
+"""Contacts that share what they carry: forces well within cones, and rows that do not hold.
+
+Each contact has a rim, what is left of its cone: r - |v| of its friction v within a radius r, or
+its normal force. Of forces f that hold those are taken with the least of
+
+    |f|^2 / (2 size^2) - sum of log (r^2 - |v|^2),
+
+by Newton's method (Boyd, Vandenberghe, Convex Optimization, 2004, ch. 9 and 11): all are as far
+from their limits as they can be together. Before, where the least forces that hold are outside,
+normal forces count as if they were t more, and t is made less until it is not needed.
+"""
 
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
+import math
+
+import numpy as np
+
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
-from dap3d_core.formulations.contacts.forces import largest_entry, pressing, put_sizes, solve_forces
+from dap3d_core.formulations.contacts.forces import largest_entry, put_open, put_rates, put_sizes
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.linear.least_squares import factor_least, solve_least
+from dap3d_core.linear.least_squares import factor_least, put_null, solve_least
 
 #: Part of the largest entry of A below which rows depend on each other.
 DEPENDENT = 1e-12
@@ -15,15 +29,15 @@ DEPENDENT = 1e-12
 HELD, OF_REST, RATE_ROUNDING = 1e-9, 0.05, 1e-13
 #: Part of the largest force that is rounding of one.
 FORCE_ROUNDING = 1e-12
-#: How many parts of their cones within which contacts that share what they carry may be to stay,
-#: each leaving half of what the one before leaves: what they carry reaches its limit with so much
-#: left, 1e-9. And how many normal forces, each half of the one before.
-PARTS = 30
-#: Normal force that each of them has, as a part of an equal share, where it can: what carried
-#: nothing would be at its limit at once.
-LEAST = 0.2
-#: Tries of a cone problem that may have no solution.
-FEW = 3
+#: Part of the largest force that cones leave, at least, where contacts hold inside them.
+LEAST_RIM = 1e-11
+#: Of Newton's method passes at most, the decrement at which it is near, and how much more t weighs
+#: each time that it is.
+PASSES, NEAR, HEAVIER = 50, 0.25, 10.0
+#: A load that bounds nothing.
+BOUNDLESS = 1e100
+#: Part of a diagonal that is rounding of a pivot.
+PIVOT = 1e-16
 
 
 @compiled
@@ -55,85 +69,85 @@ def put_own_rows(s: ContactArrays) -> int:
 
 
 @compiled
-def left_of(k: int) -> float:
-    """What the part of their cones of a number leaves."""
-    left = 1.0
-    for _ in range(k + 1):
-        left *= 0.5
-    return left
-
-
-@compiled
 def hold_inside(s: ContactArrays) -> bool:
     """Forces ``inner`` well within the cones of closed contacts that share, and hold, if any."""
-    for k in range(3 * s.closed_count):
-        s.cone.x[k] = 0.0
     resists = False
     for k in range(s.closed_count):
-        s.slipping[s.closed[k]] = 0
         resists |= s.under[s.closed[k]] >= 0
-    if resists and are_held_within(s, 0, 0, 0.0):  # they carry nothing that others can
-        return True
-    for k in range(3 * s.closed_count):
-        s.cone.x[k] = 0.0
-    if are_held_within(s, 0, 0):  # as a rule
-        return True
-    for k in range(3 * s.closed_count):
-        s.cone.x[k] = 0.0
-    if not are_held_within(s, PARTS - 1, PARTS - 1):
-        return False
-    part = bring_in(s, -1)
-    bring_in(s, min(part + 1, PARTS - 1))
-    return True
+    # as a rule what resists rolling carries nothing that others can
+    return (resists and are_held_inside(s, False)) or are_held_inside(s, True)
 
 
 @compiled
-def bring_in(s: ContactArrays, part: int) -> int:
-    """The first part of the cones that holds; or, within one, the first normal force that does."""
-    low, high = 0, PARTS - 2
-    while low <= high:  # what one allows, so does every later one
-        k = (low + high) // 2
-        for q in range(3 * s.closed_count):
-            s.cone.x[q] = s.inner[q]
-        if are_held_within(s, k if part < 0 else part, PARTS - 1 if part < 0 else k):
-            high = k - 1
-        else:
-            low = k + 1
-    return low
+def are_held_inside(s: ContactArrays, resisting: bool) -> bool:
+    """True if forces within the cones hold; these are ``inner`` then.
 
-
-@compiled
-def are_held_within(s: ContactArrays, part: int, least: int, resisting: float = 1.0) -> bool:
-    """True if forces within a part of the cones hold; these are ``inner`` then.
-
-    least: the number of the normal force that each has at least.
-    resisting: 0 where what resists rolling is to carry nothing.
+    resisting: what resists rolling carries something.
     """
-    load, count, left = 0.0, 0, left_of(part)
-    for k in range(s.closed_count):
-        c = s.closed[k]
-        if s.alone[c] == 0:
-            load, count = max(load, -s.free[3 * c] / s.cone.A[3 * k, 3 * k]), count + 1
-    normal = LEAST * left_of(least) * load / count if count > 1 else 0.0
-    solve_forces(s, 1.0 - left, FEW, normal, resisting)
-    x, A, big = s.cone.x, s.cone.A, put_sizes(s, True)
-    for q in range(put_own_rows(s)):
+    put_open(s)
+    free = put_least(s, resisting)
+    if free < 0 or not come_inside(s, free):
+        return False
+    put_rates(s)
+    n, big = put_own_rows(s), put_sizes(s, True)
+    for q in range(n):
         k = s.rows[q] // 3
-        c = s.closed[k]
-        own = max(A[3 * k, 3 * k], A[3 * k + 1, 3 * k + 1], A[3 * k + 2, 3 * k + 2])
-        carried = s.mu_s[c] * pressing(s, k)
-        rest = OF_REST * left * own * carried + RATE_ROUNDING * big
+        row = 3 * k
+        own = max(s.cone.A[row, row], s.cone.A[row + 1, row + 1], s.cone.A[row + 2, row + 2])
+        rest = OF_REST * own * rim_of(s, k) + RATE_ROUNDING * big
         if not abs(s.rates[s.rows[q]]) <= min(HELD * s.sizes[k], rest):
             return False
-    if not is_left_to_rows(s, left):
+    if not is_left_to_rows(s):
         return False
     for k in range(3 * s.closed_count):
-        s.inner[k] = x[k]
+        s.inner[k] = s.cone.x[k]
     return True
 
 
 @compiled
-def is_left_to_rows(s: ContactArrays, left: float) -> bool:
+def put_least(s: ContactArrays, resisting: bool) -> int:
+    """The least forces ``cone.x`` that hold, if any, and vectors ``cone.K`` of what may be added.
+
+    Returns how many of these there are; -1 where nothing holds.
+    """
+    n, A, x, K, count = put_own_rows(s), s.cone.A, s.cone.x, s.cone.K, 0
+    for k in range(3 * s.closed_count):
+        x[k] = 0.0
+    for q in range(n):
+        s.right[q] = -s.cone.b[s.rows[q]]
+        for i in range(n if carries(s, s.rows[q], resisting) else 0):
+            s.B[i, count] = A[s.rows[i], s.rows[q]]
+        count += carries(s, s.rows[q], resisting)
+    least = DEPENDENT * largest_entry(A, 3 * s.closed_count)
+    rank = factor_least(s.B, n, count, 0.0, least, s.w, s.order)
+    for k in range(3 * s.closed_count):
+        for i in range(count - rank + 1):
+            K[k, i] = 0.0
+    solve_least(s.B, n, count, rank, s.w, s.order, s.right, s.x)
+    for i in range(-1, count - rank):
+        if i >= 0:
+            put_null(s.B, count, rank, s.w, s.order, i, s.x)
+        count = 0
+        for q in range(n):
+            if carries(s, s.rows[q], resisting):
+                if i >= 0:
+                    K[s.rows[q], i] = s.x[count]
+                else:
+                    x[s.rows[q]] = s.x[count]
+                count += 1
+    return count - rank if rank > 0 else -1
+
+
+@compiled
+def carries(s: ContactArrays, row: int, resisting: bool) -> bool:
+    """True of a row of closed contacts, one of those along which they act, that may carry."""
+    c = s.closed[row // 3]
+    bounded = s.alone[c] == 0 or (s.mu_s[c] > 0.0 and (resisting or s.under[c] < 0))
+    return bounded and (row % 3 < 2 or s.ratio_s[c] > 0.0)
+
+
+@compiled
+def is_left_to_rows(s: ContactArrays) -> bool:
     """True if rows end what is left of rates by little of what the cones leave.
 
     Of weak rows that is more force than their own mobility tells.
@@ -148,11 +162,183 @@ def is_left_to_rows(s: ContactArrays, left: float) -> bool:
     for k in range(3 * s.closed_count):
         big = max(big, abs(s.cone.x[k]))
     for q in range(n):
-        k = s.rows[q] // 3
-        carried = s.mu_s[s.closed[k]] * pressing(s, k)
-        if carried > 0.0 and not abs(s.right[q]) <= OF_REST * left * carried + FORCE_ROUNDING * big:
+        if not abs(s.right[q]) <= OF_REST * rim_of(s, s.rows[q] // 3) + FORCE_ROUNDING * big:
             return False
     return True
+
+
+@compiled
+def come_inside(s: ContactArrays, free: int) -> bool:
+    """True if forces that hold are inside the cones; they become ``cone.x``, the centre of them.
+
+    Args:
+        s: with the least forces that hold, and vectors ``cone.K`` that may be added.
+        free: how many of these there are.
+    """
+    size, terms = 0.0, 5.0 * s.closed_count  # twice as many logarithms as cones, and forces
+    for k in range(3 * s.closed_count):
+        size = max(size, abs(s.cone.x[k]))
+    t = farthest_outside(s)
+    if not size > 0.0 or not t < np.inf:
+        return False
+    t, weight = t + size, 1.0 / size
+    while t >= 0.0:
+        for _ in range(PASSES):
+            t, decrement = pass_with(s, free, t, weight, size)
+            if t < 0.0 or not decrement > NEAR:
+                break
+        if t >= 0.0 and not t < terms / weight - LEAST_RIM * size:
+            return False
+        weight *= HEAVIER
+    for _ in range(PASSES):
+        t, decrement = pass_with(s, free, 0.0, 0.0, size)
+        if not decrement > NEAR:
+            break
+    return farthest_outside(s) < 0.0
+
+
+@compiled
+def steepness(s: ContactArrays, k: int) -> float:
+    """Radius of closed contact k by what presses; 1 of what has no friction, or slides."""
+    c = s.closed[k]
+    return 1.0 if s.slides[c] != 0 or (s.alone[c] == 0 and s.mu_s[c] == 0.0) else s.mu_s[c]
+
+
+@compiled
+def is_bound(s: ContactArrays, k: int) -> bool:
+    """True if closed contact k has a limit that what it carries could reach."""
+    c = s.closed[k]
+    slides_alone = s.slides[c] != 0 and s.alone[c] != 0
+    return not slides_alone and s.load[c] < BOUNDLESS and steepness(s, k) > 0.0
+
+
+@compiled
+def radius_of(s: ContactArrays, k: int) -> float:
+    """The radius of the cone of closed contact k."""
+    c, u = s.closed[k], s.cone.under[k]
+    pressing = s.load[c] + (s.cone.x[3 * u] if s.gapless[c] == 0.0 else 0.0)
+    return steepness(s, k) * pressing
+
+
+@compiled
+def part_across(s: ContactArrays, k: int, i: int) -> float:
+    """By how much component i counts in the cone of closed contact k: an ellipse is a circle."""
+    c = s.closed[k]
+    if (i == 0 and s.gapless[c] == 0.0) or s.slides[c] != 0:
+        return 0.0
+    return 1.0 / s.ratio_s[c] if i == 2 and s.ratio_s[c] > 0.0 else 1.0
+
+
+@compiled
+def rim_of(s: ContactArrays, k: int) -> float:
+    """What is left of the cone of closed contact k; infinite of one without a limit."""
+    if not is_bound(s, k):
+        return np.inf
+    square = 0.0
+    for i in range(3):
+        v = part_across(s, k, i) * s.cone.x[3 * k + i]
+        square += v * v
+    return radius_of(s, k) - math.sqrt(square)
+
+
+@compiled
+def farthest_outside(s: ContactArrays) -> float:
+    """How much more normal force would bring all onto their cones; below zero inside."""
+    found = -np.inf
+    for k in range(s.closed_count):
+        if is_bound(s, k):
+            found = max(found, -rim_of(s, k) / steepness(s, k))
+    return found
+
+
+@compiled
+def pass_with(
+    s: ContactArrays, free: int, t: float, weight: float, size: float
+) -> tuple[float, float]:
+    """A pass of Newton's method; t behind it, and the decrement before.
+
+    weight: of t, which is kept where it has none.
+    """
+    n, x, K, H, g = free + (1 if weight > 0.0 else 0), s.cone.x, s.cone.K, s.cone.S, s.cone.F
+    for j in range(n):
+        g[j] = weight if j == free else 0.0
+        for k in range(3 * s.closed_count):
+            g[j] += K[k, j] * x[k] / (size * size)
+        for q in range(j + 1):
+            H[j, q] = 1.0 / (size * size) if q == j < free else 0.0
+    for k in range(s.closed_count):
+        if is_bound(s, k):
+            add_cone(s, k, free, n, t)
+    decrement = solve_definite(s, n)
+    part, step = 1.0 / (1.0 + decrement) if decrement > NEAR else 1.0, s.cone.step
+    while part > PIVOT:
+        for k in range(3 * s.closed_count):
+            for j in range(free):
+                x[k] += part * K[k, j] * step[j]
+        later = t + part * step[free] if n > free else t
+        if farthest_outside(s) < later:
+            return later, decrement
+        for k in range(3 * s.closed_count):
+            for j in range(free):
+                x[k] -= part * K[k, j] * step[j]
+        part *= 0.5
+    return t, 0.0
+
+
+@compiled
+def add_cone(s: ContactArrays, k: int, free: int, n: int, t: float) -> None:
+    """Add the derivatives of the logarithm of a cone to those of the sum."""
+    c, u, mu = s.closed[k], s.cone.under[k], steepness(s, k)
+    K, H, g, wider, slope = s.cone.K, s.cone.S, s.cone.F, s.cone.q, s.cone.moved
+    r, square = radius_of(s, k) + mu * t, 0.0
+    for i in range(3):
+        v = part_across(s, k, i) * s.cone.x[3 * k + i]
+        square += v * v
+    left = (r - math.sqrt(square)) * (r + math.sqrt(square))
+    for j in range(n):
+        wider[j] = mu if j == free else 0.0
+        if j < free and s.gapless[c] == 0.0:
+            wider[j] = mu * K[3 * u, j]
+        slope[j] = r * wider[j]
+        for i in range(3):
+            part = part_across(s, k, i)
+            slope[j] -= part * part * s.cone.x[3 * k + i] * K[3 * k + i, j]
+        slope[j] *= 2.0 / left
+        g[j] -= slope[j]
+    for j in range(n):
+        for q in range(j + 1):
+            bend = wider[j] * wider[q]
+            for i in range(3):
+                part = part_across(s, k, i)
+                bend -= part * part * K[3 * k + i, j] * K[3 * k + i, q]
+            H[j, q] += slope[j] * slope[q] - 2.0 * bend / left
+
+
+@compiled
+def solve_definite(s: ContactArrays, n: int) -> float:
+    """Put ``cone.step``, -H^-1 g, by Cholesky; returns the decrement, (g H^-1 g)^(1/2)."""
+    H, g, x, square = s.cone.S, s.cone.F, s.cone.step, 0.0
+    for j in range(n):
+        own = H[j, j]
+        for q in range(j):
+            total = H[j, q]
+            for p in range(q):
+                total -= H[j, p] * H[q, p]
+            H[j, q] = total * H[q, q]
+        pivot = own
+        for q in range(j):
+            pivot -= H[j, q] * H[j, q]
+        H[j, j] = 1.0 / math.sqrt(pivot) if pivot > PIVOT * own else 0.0
+        x[j] = -g[j]
+        for q in range(j):
+            x[j] -= H[j, q] * x[q]
+        x[j] *= H[j, j]
+        square += x[j] * x[j]
+    for j in range(n - 1, -1, -1):
+        for p in range(j + 1, n):
+            x[j] -= H[p, j] * x[p]
+        x[j] *= H[j, j]
+    return math.sqrt(square)
 
 
 @compiled
