@@ -33,8 +33,18 @@ def do_share(s: ContactArrays) -> bool:
     for i in range(n):
         for k in range(n):
             s.B[i, k] = A[s.rows[i], s.rows[k]]
-    least = DEPENDENT * largest_entry(A, 3 * s.closed_count)
+    least = DEPENDENT * max(largest_entry(A, 3 * s.closed_count), most_mobile(s))
     return factor_least(s.B, n, n, 0.0, least, s.w, s.order) < n
+
+
+@compiled
+def most_mobile(s: ContactArrays) -> float:
+    """The most that a row of closed contacts changes of itself, as if there were no joints."""
+    most = 0.0
+    for k in range(s.closed_count):
+        for row in range(3 * s.closed[k], 3 * s.closed[k] + 3):
+            most = max(most, mobility(s, row, row, False))
+    return most
 
 
 @compiled
@@ -183,11 +193,11 @@ def hold_freest(s: ContactArrays, count: int, alone: int) -> int:
     Returns:
         How many rows hold then.
     """
-    left, least = 0, DEPENDENT * largest_entry(s.W, s.W.shape[0])
+    left, least = 0, DEPENDENT * max(largest_entry(s.W, s.W.shape[0]), most_mobile(s))
     for k in range(s.closed_count):
         c = s.closed[k]
         for i in range(1 - alone, 3 if is_left(s, c, alone) else 0):
-            s.way[c, i] = s.holds[c, i]
+            s.way[c, i] = s.holds[c, i] * s.length[c]
             left += s.holds[c, i]
     best = 0
     while left > 0 and best >= 0:
@@ -196,7 +206,7 @@ def hold_freest(s: ContactArrays, count: int, alone: int) -> int:
         for k in range(s.closed_count):
             c = s.closed[k]
             for i in range(3 if is_left(s, c, alone) else 0):
-                if s.way[c, i] == 1.0:
+                if s.way[c, i] > 0.0:
                     free = freedom_of(s, 3 * c + i, count, rank, True)
                     if free > most:
                         best, most = 3 * c + i, free
@@ -210,7 +220,7 @@ def hold_freest(s: ContactArrays, count: int, alone: int) -> int:
         for i in range(3 if is_left(s, c, alone) else 0):
             row = 3 * c + i
             small = DEPENDENT * mobility(s, row, row, False)
-            if s.way[c, i] == 1.0 and freedom_of(s, row, of_bodies, rank, False) <= small:
+            if s.way[c, i] > 0.0 and freedom_of(s, row, of_bodies, rank, False) <= small:
                 count = hold_row(s, row, count)
     return count
 

@@ -18,6 +18,8 @@ OPEN, SLIDES, STICKS, STEPPED = 0.0, 1.0, 2.0, 3.0
 STILL = 1e-8
 #: The same of friction in an ellipse, which turns slip all the way to its end.
 STILL_IN_ELLIPSE = 1e-10
+#: The same of slip along rows that do not hold, above which they are found anew: at rest, still.
+STRAYED = 0.5 * STILL
 #: Gap, m, of what does not touch as its surfaces end before.
 APART = 1.0
 #: The same in time stepping, which leaves out what is as far apart.
@@ -41,9 +43,22 @@ def held(mode):
 def holds(mode, way, k):
     """True where row k of friction holds: where it sticks, but for those that joints hold.
 
-    The components of ``way`` name these, 1.0; it is a direction of sliding in mode 1 alone.
+    The components of ``way`` name these, by the length of the scene; it is a direction of sliding
+    in mode 1 alone.
     """
-    return held(mode) & (way[k] < 0.5)
+    return held(mode) & (way[k] <= 0.0)
+
+
+def before_straying(rest, slip, way):
+    """The rest of a cone, negative also where slip grows along rows that others hold no longer.
+
+    A driver that begins to move is among these. Slip is still that of rest then, and what contacts
+    do is found anew.
+    """
+    x, y, z = (where(a > 0.0, u, 0.0) for a, u in zip(way, slip, strict=True))
+    square = STRAYED**2 * dot(way, way)
+    left = 1.0 - (x * x + y * y + z * z) / where(square > 0.0, square, 1.0)
+    return where((square > 0.0) & (left < rest), left, rest)
 
 
 def tangents(n, grain=None):
@@ -225,13 +240,14 @@ def switch(gap, reach, c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, hol
         held_by = (dot(tangential, first), part * dot(tangential, second), 0.0)
     slides = where(mu > 0.0, dot(slip, unit(across(way, n))), 1.0)
     sticks = where(mu_s > 0.0, mu_s * normal - sqrt(dot(held_by, held_by)), 1.0)
+    along = tuple(dot(slip, e) for e in (n, *tangents(n, grain)))
     return (
         where(
             closed(mode),
             where(reach < normal, reach, normal),
             where(reach < 0.0, APART, gap),
         ),
-        where(held(mode), sticks, where(closed(mode), slides, 1.0)),
+        where(held(mode), before_straying(sticks, along, way), where(closed(mode), slides, 1.0)),
     )
 
 
