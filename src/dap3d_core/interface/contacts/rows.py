@@ -18,8 +18,9 @@ OPEN, SLIDES, STICKS, STEPPED = 0.0, 1.0, 2.0, 3.0
 STILL = 1e-8
 #: The same of friction in an ellipse, which turns slip all the way to its end.
 STILL_IN_ELLIPSE = 1e-10
-#: The same of slip along rows that do not hold, above which they are found anew: at rest, still.
-STRAYED = 0.5 * STILL
+#: The same of slip along rows that do not hold, above which modes are found anew: at rest, still
+#: (``still_speed``).
+STRAYED = 5e-10
 #: Gap, m, of what does not touch as its surfaces end before.
 APART = 1.0
 #: The same in time stepping, which leaves out what is as far apart.
@@ -47,6 +48,11 @@ def holds(mode, way, k):
     in mode 1 alone.
     """
     return held(mode) & (way[k] <= 0.0)
+
+
+def presses(mode, way):
+    """True where the normal row holds: where it is closed, but for those that joints hold."""
+    return closed(mode) & ((mode < 1.5) | (way[0] <= 0.0))
 
 
 def before_straying(rest, slip, way):
@@ -112,7 +118,7 @@ def blocks(c, n, grain, r_i, r_j, mode, way):
     """J of both bodies."""
     first, second = tangents(n, grain)
     directions = (
-        where(closed(mode), n, _ZERO),
+        where(presses(mode, way), n, _ZERO),
         where(holds(mode, way, 1), first, _ZERO),
         where(holds(mode, way, 2), second, _ZERO),
     )
@@ -143,7 +149,7 @@ def gamma(c, c_dot, n, n_dot, grain, grain_dot, r_i, v_i, w_i, r_j, v_j, w_j, mo
     pairs = (n, n_dot), (first, first_dot), (second, second_dot)
     values = tuple(-dot(e_dot, slip) - dot(e, bent) for e, e_dot in pairs)
     return (
-        where(closed(mode), values[0], 0.0),
+        where(presses(mode, way), values[0], 0.0),
         where(holds(mode, way, 1), values[1], 0.0),
         where(holds(mode, way, 2), values[2], 0.0),
     )
