@@ -180,6 +180,7 @@ class PointCurve(Contact):
     """
 
     keyword = "point_curve"
+    synonyms = ("cam", "cam-follower", "point-curve")
     example: ClassVar[Mapping[str, str]] = {"function": '"motor"'}
     P_i: Point = point(doc="the point, centre of the roller")
     radius: float = number(0.0, unit="m", minimum=0.0, doc="of the roller; 0: a point")

@@ -393,3 +393,53 @@ def test_feet_that_slide_fast_lift_and_land_without_endless_steps():
     assert result.status == "done"
     assert {"lift", "touch", "slip"} <= {event.kind for event in result.events}
     assert result.ledger["energy"].value < 1e-10
+
+
+@pytest.mark.parametrize("method", ["lsq", "joint"])
+def test_a_gripper_lifts_what_it_holds_and_what_stands(method):
+    """Joints hold what the grips would, until the hoist begins to move: the box leaves the floor.
+
+    With the fingers at rest the friction of the grips is a choice, beside that of the floor.
+    """
+    scene = dap.Scene(name="gripper")
+    scene.add_body("box", mass=0.5, Jp=[1e-3] * 3, r=[0.0, 0.0, 0.05])
+    scene.add_body("palm", mass=2.0, Jp=[0.01] * 3, r=[0.0, 0.0, 0.3])
+    scene.add_joint("tran", "lift", P_i="palm.O", P_j="ground.O", a_j="ground.z")
+    scene.add_function("step", "rise", x_start=0.3, x_end=1.3, f_start=0.0, f_end=0.2)
+    scene.add_joint("motor", "hoist", joint="lift", position="rise")
+    scene.add_contact("box_plane", "floor", P_i="box.O", size=[0.1] * 3, mu=0.5)
+    for name, side in (("left", -1.0), ("right", 1.0)):
+        scene.add_body(name, mass=0.2, Jp=[1e-4] * 3, r=[side * 0.08, 0.0, 0.05])
+        scene.add_point(f"{name}_rail", name, [0.0, 0.0, 0.25])
+        scene.add_point(f"{name}_tip", name, [-side * 0.02, 0.0, 0.0])
+        scene.add_joint("tran", f"{name}_slide", P_i=f"{name}_rail", P_j="palm.O", a_j="palm.x")
+        scene.add_force("tran_sda", joint=f"{name}_slide", f_a=-side * 10.0, c=5.0)
+        grip = {"P_i": f"{name}_tip", "radius": 0.01, "P_j": "box.O", "size": [0.1] * 3}
+        scene.add_contact("ball_box", f"{name}_grip", **grip, mu=0.8)
+    scene.add_force("weight", "g")
+    result = dap.simulate(scene, t_end=1.0, dt=0.05, method=method)
+    u = np.clip(result.t - 0.3, 0.0, 1.0)
+    rise = 0.2 * (3.0 * u**2 - 2.0 * u**3)
+    assert abs(result.r[:, 0, 2] - 0.05 - rise).max() < TOLERANCE
+    assert [e.t for e in result.events if e.kind == "lift"] == pytest.approx([0.3] * 4, abs=1e-8)
+    assert not times(result, "slip")
+    carried = result.contact("left_grip")
+    held = 0.25 * (G + 0.2 * (6.0 - 12.0 * u))
+    assert abs(carried.friction[7:, 2] + held[7:]).max() < TOLERANCE
+    assert (carried.mode == 2).all()
+    assert abs(carried.slip).max() < TOLERANCE
+
+
+def test_a_motor_begins_to_turn_a_hinge_that_friction_holds():
+    scene = dap.Scene(name="hinge")
+    scene.add_body("wheel", mass=2.0, Jp=[0.5, 0.5, 0.3])
+    axle = {"P_i": "wheel.O", "P_j": "ground.O", "a_i": "wheel.z", "a_j": "ground.z"}
+    scene.add_joint("rev", "axle", **axle)
+    scene.add_function("step", "turns", x_start=0.3, x_end=1.3, f_start=0.0, f_end=1.0)
+    scene.add_joint("motor", "motor", joint="axle", position="turns")
+    scene.add_force("rot_friction", "rub", joint="axle", n_c=0.4)
+    result = dap.simulate(scene, t_end=1.2, dt=0.1)
+    assert times(result, "slip") == pytest.approx([0.3], abs=1e-8)
+    u = result.t[4:] - 0.3
+    moment = result.reaction("motor")["i"].moment[4:, 2]
+    assert abs(moment - 0.4 - 0.3 * (6.0 - 12.0 * u)).max() < TOLERANCE

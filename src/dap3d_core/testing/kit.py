@@ -117,7 +117,7 @@ def _motion(subject: SampledType) -> TypeMotion:
         return motion_of_type(subject)
     except Exception as error:  # of a kernel
         what = "cannot be compiled" if isinstance(error, PluginError) else f"fail: {_reason(error)}"
-        return TypeMotion(subject.variant, f"refused: its kernels {what}", None)
+        return TypeMotion(subject.variant, f"rows stay: its kernels {what}", None)
 
 
 def checks_for(type_: Any, *, poses: int = POSES, seed: int = SEED) -> list[Check]:

@@ -238,10 +238,9 @@ def _show(console: "Terminal", data: dict[str, Any], *, names: bool) -> None:
     pairs = [("acts on", bodies_text(data)), ("from", f"{origin}, {data['module']}")]
     if data["kind"] == "joint":
         pairs[:1] = [("rows", rows_text(data)), ("bodies", bodies_text(data))]
-        pairs[2:2] = [
-            ("motion", f"with {m['variant']}: {m['words']}" if m["variant"] else m["words"])
-            for m in data["motions"]
-        ]
+        words = (f"with {m['variant']}: {m['words']}" if m["variant"] else m["words"]
+                 for m in data["motions"])  # fmt: skip
+        pairs[2:2] = [("method joint", one) for one in dict.fromkeys(words)]
     if data["synonyms"]:
         pairs.append(("called", ", ".join(data["synonyms"]) + " elsewhere"))
     if data["states"]:

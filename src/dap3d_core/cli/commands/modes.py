@@ -28,14 +28,14 @@ NAMED, LEAST_SHARE = 3, 0.05
 @command(
     "Compute frequencies, damping, mode shapes.",
     options.MODEL,
-    click.option("--from", "start", metavar="RESULT[@TIME]",
+    click.option("--at", "--from", "start", metavar="RESULT[@TIME]",
                  help="Linearise about a state of a result, at an instant in s or its last one; by "
                       "default about the start of the model."),
     click.option("--t", "time", type=options.FiniteFloat(), metavar="S",
-                 help="Time of drivers and functions; 0 by default. Not with --from."),
+                 help="Time of drivers and functions; 0 by default. Not with --at."),
     click.option("--over", metavar="PARAMETER=FROM:TO:N", shell_complete=completion.parameters,
                  help="Follow the modes over the values of a parameter, also FROM:TO:N:log or a "
-                      "list. Not with --from, --mode, -o."),
+                      "list. Not with --at, --mode, -o."),
     click.option("-n", "--number", type=click.IntRange(min=1), metavar="NUMBER",
                  help="Number of modes, the lowest ones; 20 are listed by default, 10 of a model "
                       "of more than 150 bodies."),
@@ -72,7 +72,7 @@ def modes(
 
     \b
     dap3d modes pen1
-    dap3d modes pen1 --from pen1.nc@1.5
+    dap3d modes pen1 --at pen1.nc@1.5
     dap3d modes pen1 --plot modes.png
     dap3d modes pen1 --over bodies.cone.mass=1:5:9 --plot campbell.png
     dap3d modes pen1 --over bodies.cone.mass=1:5:9 --plot locus.png --locus
@@ -83,7 +83,7 @@ def modes(
 
     targets = _targets(plot, output, force)
     if start is not None and time is not None:
-        raise Refused("--t does not go with --from: the time is that of the result, RESULT@TIME")
+        raise Refused("--t does not go with --at: the time is that of the result, RESULT@TIME")
     if mode is not None and output is None:
         raise Refused("--mode chooses the motion that -o writes: name its file, -o FILE.nc")
     if locus and (over is None or plot is None):
@@ -91,7 +91,7 @@ def modes(
     scene = dap.load(model)
     if over is not None:
         if not (start is None and output is None):
-            raise Refused("--over does not go with --from, --mode and -o: it is about many starts")
+            raise Refused("--over does not go with --at, --mode and -o: it is about many starts")
         return _over(scene, over, time, number, plot, locus, force, allow_code)
     at, t = state_of(start, allow_code) if start else (None, time or 0.0)
     with refusing(dap.SimulationError):

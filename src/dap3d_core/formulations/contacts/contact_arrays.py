@@ -121,7 +121,7 @@ class ContactArrays(Arrays):
     # what is found
     mode: Floats  # (m,) 0 open, 1 slides, 2 sticks
     way: Matrix  # (m, 3) directions of sliding, as long as ``length``, zero where none is known; of
-    near: Matrix  # friction alone that sticks 1 for rows that do not hold, as others hold that;
+    near: Matrix  # what sticks that length for rows that do not hold, as others hold that;
     force: Matrix  # forces on body i of those that share, global axes; forces in their frames
     jams: Integers  # 1 of contacts that jam
     moved: Floats  # (6 n,) small r and rotation vectors

@@ -44,6 +44,7 @@ from dap3d_core.formulations.contacts.rows import (
     unscale,
 )
 from dap3d_core.formulations.switches import POSITION_ROUNDING
+from dap3d_core.interface.contacts.rows import STRAYED
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.least_squares import factor_least, solve_least
 
@@ -217,7 +218,7 @@ def take_ended(s: ContactArrays) -> None:
         s.leaves[c] = s.ended[c, 0] != 0 and s.was[c] > 0.5
         if s.ended[c, 1] == 0:
             continue
-        if s.was[c] > 1.5:
+        if s.was[c] > 1.5 and size_across(s, c, s.slip[c]) < 0.5 * STRAYED * s.length[c]:
             friction = s.says.found[c][FRICTION:]
             for i in range(3):
                 force[i] = 0.0
@@ -226,7 +227,7 @@ def take_ended(s: ContactArrays) -> None:
             if size_across(s, c, force) > 0.0:
                 put_slip_against(s, c, force, s.begin_way[c])
                 s.begins[c] = 1
-        elif size_across(s, c, s.slip[c]) < STOPPED * s.length[c]:
+        elif s.was[c] < 1.5 and size_across(s, c, s.slip[c]) < STOPPED * s.length[c]:
             s.stops[c] = 1
 
 

@@ -47,8 +47,18 @@ def do_share(s: ContactArrays) -> bool:
     for i in range(n):
         for k in range(n):
             s.B[i, k] = A[s.rows[i], s.rows[k]]
-    least = DEPENDENT * largest_entry(A, 3 * s.closed_count)
+    least = DEPENDENT * max(largest_entry(A, 3 * s.closed_count), most_mobile(s))
     return factor_least(s.B, n, n, 0.0, least, s.w, s.order) < n
+
+
+@compiled
+def most_mobile(s: ContactArrays) -> float:
+    """The most that a row of closed contacts changes of itself, as if there were no joints."""
+    most = 0.0
+    for k in range(s.closed_count):
+        for row in range(3 * s.closed[k], 3 * s.closed[k] + 3):
+            most = max(most, mobility(s, row, row, False))
+    return most
 
 
 @compiled
@@ -118,7 +128,7 @@ def put_least(s: ContactArrays, resisting: bool) -> int:
         for i in range(n if carries(s, s.rows[q], resisting) else 0):
             s.B[i, count] = A[s.rows[i], s.rows[q]]
         count += carries(s, s.rows[q], resisting)
-    least = DEPENDENT * largest_entry(A, 3 * s.closed_count)
+    least = DEPENDENT * max(largest_entry(A, 3 * s.closed_count), most_mobile(s))
     rank = factor_least(s.B, n, count, 0.0, least, s.w, s.order)
     for k in range(3 * s.closed_count):
         for i in range(count - rank + 1):
@@ -343,37 +353,39 @@ def solve_definite(s: ContactArrays, n: int) -> float:
 
 @compiled
 def leave_to_others(s: ContactArrays) -> None:
-    """Let rows of friction not hold where others, and the joints, hold what they would.
+    """Let rows of what sticks not hold where others, and the joints, hold what they would.
 
     They carry what was found for them; joints and rows would divide that between them otherwise.
     """
     count = 0
     for k in range(s.closed_count):
         c = s.closed[k]
-        if s.alone[c] == 0 and s.mode[c] > 0.5:
+        if s.alone[c] == 0 and s.mode[c] == 1.0:
             s.rows[count] = 3 * c
             count += 1
-    hold_freest(s, hold_freest(s, count, 0), 1)
+    count = hold_freest(s, count, 0, 0, 1)
+    hold_freest(s, hold_freest(s, count, 0, 1, 3), 1, 0, 3)
 
 
 @compiled
-def hold_freest(s: ContactArrays, count: int, alone: int) -> int:
-    """Let rows of friction hold, the freest first, and others not, until these are found to.
+def hold_freest(s: ContactArrays, count: int, alone: int, first: int, end: int) -> int:
+    """Let rows of what sticks hold, the freest first, and others not, until these are found to.
 
-    Tangents of contacts hold as well where without joints they depend on each other: they share.
+    Rows of contacts hold as well where without joints they depend on each other: they share.
 
     Args:
         s: with the first rows, ``count`` of them, that hold.
         alone: 1 of friction of joints alone, 0 of contacts.
+        first, end: rows of each contact, from 0: its normal, its tangents.
 
     Returns:
         How many rows hold then.
     """
-    left, least = 0, DEPENDENT * largest_entry(s.W, s.W.shape[0])
+    left, least = 0, DEPENDENT * max(largest_entry(s.W, s.W.shape[0]), most_mobile(s))
     for k in range(s.closed_count):
         c = s.closed[k]
-        for i in range(1 - alone, 3 if is_left(s, c, alone) else 0):
-            s.way[c, i] = s.holds[c, i]
+        for i in range(first, end if is_left(s, c, alone) else 0):
+            s.way[c, i] = s.holds[c, i] * s.length[c]
             left += s.holds[c, i]
     best = 0
     while left > 0 and best >= 0:
@@ -381,8 +393,8 @@ def hold_freest(s: ContactArrays, count: int, alone: int) -> int:
         most = least
         for k in range(s.closed_count):
             c = s.closed[k]
-            for i in range(3 if is_left(s, c, alone) else 0):
-                if s.way[c, i] == 1.0:
+            for i in range(first, end if is_left(s, c, alone) else 0):
+                if s.way[c, i] > 0.0:
                     free = freedom_of(s, 3 * c + i, count, rank, True)
                     if free > most:
                         best, most = 3 * c + i, free
@@ -393,10 +405,10 @@ def hold_freest(s: ContactArrays, count: int, alone: int) -> int:
     of_bodies, rank = count, factor_rows(s, count, False)
     for k in range(s.closed_count):
         c = s.closed[k]
-        for i in range(3 if is_left(s, c, alone) else 0):
+        for i in range(first, end if is_left(s, c, alone) else 0):
             row = 3 * c + i
             small = DEPENDENT * mobility(s, row, row, False)
-            if s.way[c, i] == 1.0 and freedom_of(s, row, of_bodies, rank, False) <= small:
+            if s.way[c, i] > 0.0 and freedom_of(s, row, of_bodies, rank, False) <= small:
                 count = hold_row(s, row, count)
     return count
 

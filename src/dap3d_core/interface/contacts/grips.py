@@ -8,7 +8,14 @@ The functions whose names begin with turning are of a moment about e.
 # Kernels take numbers of any kind: floats, and symbols of a trace.
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
 
-from dap3d_core.interface.contacts.rows import closed, held, holds, rate, slip_of
+from dap3d_core.interface.contacts.rows import (
+    before_straying,
+    closed,
+    held,
+    holds,
+    rate,
+    slip_of,
+)
 from dap3d_core.kernels import cross, dot, maximum, neg, row, scale, sub, where
 
 _ZERO = (0.0, 0.0, 0.0)
@@ -79,6 +86,7 @@ def ends(speed, e, lam, mu, mu_s, mode, way, near, unit_mass):
     """What ends a mode where it is negative: nothing; slip, or the rest of what sticks."""
     size = whole(e, lam, mu, mode, way, near)
     sticks = where(mu_s > 0.0, (mu_s - maximum(size, -size)) / unit_mass, 1.0)
+    sticks = before_straying(sticks, (0.0, speed, 0.0), way)
     slides = where(mu > 0.0, speed * sense(e, way), 1.0)
     return 1.0, where(held(mode), sticks, where(closed(mode), slides, 1.0))
 

@@ -16,6 +16,7 @@ from dap3d_core.interface.contacts.grips import sense
 from dap3d_core.interface.contacts.resistance import RESISTED
 from dap3d_core.interface.contacts.rows import (
     across,
+    before_straying,
     closed,
     direction,
     held,
@@ -228,17 +229,18 @@ def turning_friction_of_one(axes, ahead, load, mu, mode, near):
     return turning_friction(axes, ahead, load, mu, mode, near)[0]
 
 
-def switch(axes, u, ahead, toward, lam, load, mu, mu_s, mode, near, unit_mass):
+def switch(axes, u, ahead, toward, lam, load, mu, mu_s, mode, way, near, unit_mass):
     """What ends a mode where it is negative: nothing; slip, or the rest of the cone."""
     T = whole(axes, ahead, lam, load, mu, mode, near)
     sticks = where(mu_s > 0.0, (mu_s * load - sqrt(dot(T, T))) / unit_mass, 1.0)
     slides = where(mu > 0.0, dot(u, unit(toward)), 1.0)
+    sticks = before_straying(sticks, tuple(dot(u, e) for e in axes), way)
     return 1.0, where(held(mode), sticks, where(closed(mode), slides, 1.0))
 
 
-def resisting_switch(axes, u, ahead, toward, lam, load, mu, mu_s, mode, near, unit_mass):
+def resisting_switch(axes, u, ahead, toward, lam, load, mu, mu_s, mode, way, near, unit_mass):
     """The same, or a length that becomes negative."""
-    _, ends = switch(axes, u, ahead, toward, lam, load, mu, mu_s, mode, near, unit_mass)
+    _, ends = switch(axes, u, ahead, toward, lam, load, mu, mu_s, mode, way, near, unit_mass)
     return 1.0, where(closed(mode) & (mu < 0.0), mu, ends)
 
 

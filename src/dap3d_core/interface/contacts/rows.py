@@ -18,6 +18,9 @@ OPEN, SLIDES, STICKS, STEPPED = 0.0, 1.0, 2.0, 3.0
 STILL = 1e-8
 #: The same of friction in an ellipse, which turns slip all the way to its end.
 STILL_IN_ELLIPSE = 1e-10
+#: The same of slip along rows that do not hold, above which modes are found anew: at rest, still
+#: (``still_speed``).
+STRAYED = 5e-10
 #: Gap, m, of what does not touch as its surfaces end before.
 APART = 1.0
 #: The same in time stepping, which leaves out what is as far apart.
@@ -41,9 +44,27 @@ def held(mode):
 def holds(mode, way, k):
     """True where row k of friction holds: where it sticks, but for those that joints hold.
 
-    The components of ``way`` name these, 1.0; it is a direction of sliding in mode 1 alone.
+    The components of ``way`` name these, by the length of the scene; it is a direction of sliding
+    in mode 1 alone.
     """
-    return held(mode) & (way[k] < 0.5)
+    return held(mode) & (way[k] <= 0.0)
+
+
+def presses(mode, way):
+    """True where the normal row holds: where it is closed, but for those that joints hold."""
+    return closed(mode) & ((mode < 1.5) | (way[0] <= 0.0))
+
+
+def before_straying(rest, slip, way):
+    """The rest of a cone, negative also where slip grows along rows that others hold no longer.
+
+    A driver that begins to move is among these. Slip is still that of rest then, and what contacts
+    do is found anew.
+    """
+    x, y, z = (where(a > 0.0, u, 0.0) for a, u in zip(way, slip, strict=True))
+    square = STRAYED**2 * dot(way, way)
+    left = 1.0 - (x * x + y * y + z * z) / where(square > 0.0, square, 1.0)
+    return where((square > 0.0) & (left < rest), left, rest)
 
 
 def tangents(n, grain=None):
@@ -97,7 +118,7 @@ def blocks(c, n, grain, r_i, r_j, mode, way):
     """J of both bodies."""
     first, second = tangents(n, grain)
     directions = (
-        where(closed(mode), n, _ZERO),
+        where(presses(mode, way), n, _ZERO),
         where(holds(mode, way, 1), first, _ZERO),
         where(holds(mode, way, 2), second, _ZERO),
     )
@@ -128,7 +149,7 @@ def gamma(c, c_dot, n, n_dot, grain, grain_dot, r_i, v_i, w_i, r_j, v_j, w_j, mo
     pairs = (n, n_dot), (first, first_dot), (second, second_dot)
     values = tuple(-dot(e_dot, slip) - dot(e, bent) for e, e_dot in pairs)
     return (
-        where(closed(mode), values[0], 0.0),
+        where(presses(mode, way), values[0], 0.0),
         where(holds(mode, way, 1), values[1], 0.0),
         where(holds(mode, way, 2), values[2], 0.0),
     )
@@ -231,7 +252,8 @@ def switch(
         held_by = (dot(tangential, first), part * dot(tangential, second), 0.0)
     slides = where(mu > 0.0, dot(slip, unit(across(way, n))), 1.0)
     rest = (mu_s * normal - sqrt(dot(held_by, held_by))) / unit_mass
-    sticks = where(mu_s > 0.0, rest, 1.0)
+    along = tuple(dot(slip, e) for e in (n, *tangents(n, grain)))
+    sticks = before_straying(where(mu_s > 0.0, rest, 1.0), along, way)
     return (
         where(closed(mode), normal / unit_mass, gap),
         where(held(mode), sticks, where(closed(mode), slides, 1.0)),

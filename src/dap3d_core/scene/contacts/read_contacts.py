@@ -391,11 +391,12 @@ def with_unit_mass(contacts: Sequence[Instance], mass: Floats) -> list[Instance]
     It is a power of ten, and 1 kg of ordinary ones. What is far lighter than the scene may carry
     the rest of it, with forces of that rounding.
     """
-    found, least = [], LIGHTEST_PART * float(np.max(mass))
+    found, least = [], LIGHTEST_PART * float(np.max(mass, initial=0.0))
     for one in contacts:
         masses = [float(mass[k - 1]) for k in one.bodies if k > 0]
         lighter = max(least, min(masses, default=1.0))
-        unit = 1.0 if lighter >= ORDINARY_MASS else float(10.0 ** np.round(np.log10(lighter)))
+        is_light = 0.0 < lighter < ORDINARY_MASS  # masses that are mistakes are none
+        unit = float(10.0 ** np.round(np.log10(lighter))) if is_light else 1.0
         found.append(attrs.evolve(one, values=one.values | {"unit_mass": unit}))
     return found
 

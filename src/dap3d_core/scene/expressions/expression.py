@@ -396,6 +396,10 @@ def _function(tree: ast.Call, depth: int) -> Node:
     return _call(name, *arguments)
 
 
+#: How operators that are none here are written.
+_OPERATORS: Final[Mapping[type[ast.AST], str]] = {
+    ast.BitXor: "^", ast.BitAnd: "&", ast.BitOr: "|", ast.FloorDiv: "//",
+}  # fmt: skip
 #: Python's syntax that users may try, in words.
 _SYNTAX: Final[Mapping[type[ast.AST], str]] = {
     ast.IfExp: "a condition is written where(condition, value, otherwise)",
@@ -412,9 +416,9 @@ def _refused(tree: ast.AST) -> ExpressionError:
     """The error for syntax that is Python's alone."""
     operator = getattr(tree, "op", tree)
     remedy = _SYNTAX.get(type(operator)) or _SYNTAX.get(type(tree), ALLOWED)
-    return ExpressionError(
-        f"has the Python syntax {type(operator).__name__}, no arithmetic", remedy
-    )
+    sign = _OPERATORS.get(type(operator))
+    found = f"operator {sign}" if sign else f"Python syntax {type(operator).__name__}"
+    return ExpressionError(f"has the {found}, no arithmetic", remedy)
 
 
 def _too_deep() -> ExpressionError:

@@ -52,18 +52,15 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     forces = read_elements(report, geometry, "forces", types, functions)
     _check_together(report, joints, forces)
     materials = _read_materials(report)
-    contacts = _read_contacts(report, geometry, types, functions, (joints, forces), materials)
+    others = joints, forces
+    contacts = _read_contacts(report, bodies, geometry, types, functions, others, materials)
     collisions = _check_shapes_and_outputs(report, bodies, joints, materials)
     left = bool(contacts or collisions)
-    forces = _acting_forces(report, geometry, types, (joints, forces), left=left)
+    forces = _acting_forces(report, geometry, types, others, left=left)
     check_header(report)
     check_settings(report, scene.simulation, bodies.body_names, ("simulation",))
     report.raise_mistakes()
 
-    if contacts:
-        from dap3d_core.scene.contacts.read_contacts import with_unit_mass
-
-        contacts = with_unit_mass(contacts, bodies.mass)
     types.note_unused_file()
     acting = [*joints, *forces, *contacts]
     _note_loose_bodies(report, bodies, acting, collisions)
@@ -148,8 +145,8 @@ def _read_materials(report: Collector) -> Materials:
 
 
 def _read_contacts(
-    report: Collector, geometry: "Geometry", types: "Types", functions: list[Instance],
-    others: tuple[list[Instance], list[Instance]], materials: Materials,
+    report: Collector, bodies: "Bodies", geometry: "Geometry", types: "Types",
+    functions: list[Instance], others: tuple[list[Instance], list[Instance]], materials: Materials,
 ) -> list[Instance]:  # fmt: skip
     """Contacts, limits of joints, and stops that are rigid; others: joints and forces."""
     joints, forces = others
@@ -166,6 +163,7 @@ def _read_contacts(
         read_contacts,
         read_friction,
         read_rigid,
+        with_unit_mass,
     )
 
     elements = report.scene.contacts | limits_of(report, limited)
@@ -174,7 +172,8 @@ def _read_contacts(
     )
     by_name = {joint.name: joint for joint in joints}
     sticking = read_friction(report, by_name, rubbing)
-    return [*contacts, *read_rigid(report, types, rigid), *sticking]
+    contacts += [*read_rigid(report, types, rigid), *sticking]
+    return with_unit_mass(contacts, bodies.mass)
 
 
 def _sticks(force: Instance, joints: list[Instance]) -> bool:

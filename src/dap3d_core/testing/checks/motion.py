@@ -57,7 +57,7 @@ def motion_of_type(subject: SampledType) -> TypeMotion:
 
 
 def _refused(subject: SampledType, reason: str) -> TypeMotion:
-    return TypeMotion(subject.variant, f"refused: {reason}", None)
+    return TypeMotion(subject.variant, f"rows stay: {reason}", None)
 
 
 def _verdict(subject: SampledType, rng: random.Random) -> tuple[JointMotions | None, str] | None:

@@ -47,7 +47,7 @@ def checked(*arguments):
 def test_the_motion_of_a_joint_is_told():
     output = checked("rev", "sph-sph", "--poses", "1")
     assert "motion: 1 rotation about a_j, constant in body j" in output
-    assert "refused: its 1 row costs less than 5 joint coordinates" in output
+    assert "rows stay: its 1 row costs less than 5 joint coordinates" in output
 
 
 def test_the_motion_of_a_type_of_ones_own(tmp_path):

@@ -154,9 +154,9 @@ REFUSED = [
     ((*SWEEP, *VARY, *KEEP, "-o", "x"), "name a .nc file"),
     (("equilibrium", "fall.toml", "-o", "x.csv"), "name a .toml file"),
     # analyses
-    (("modes", "fall.toml", "--from", f"{R}@0.044"), "no instant at t = 0.044 s; the nearest is"),
-    (("modes", "fall.toml", "--from", f"{R}@soon"), "'soon' is no time in s"),
-    (("modes", "fall.toml", "--from", R, "--t", "1"), "--t does not go with --from"),
+    (("modes", "fall.toml", "--at", f"{R}@0.044"), "no instant at t = 0.044 s; the nearest is"),
+    (("modes", "fall.toml", "--at", f"{R}@soon"), "'soon' is no time in s"),
+    (("modes", "fall.toml", "--at", R, "--t", "1"), "--t does not go with --at"),
     (("modes", "fall.toml", "--mode", "1"), "--mode chooses the motion that -o writes"),
     (("modes", "fall.toml", "--mode", "7", "-o", "m.nc"), "the modes are 1 to 6"),
     (("modes", "fall.toml", "--plot", "e.txt"), "cannot write e.txt"),

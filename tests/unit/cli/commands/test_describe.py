@@ -147,8 +147,8 @@ def test_what_a_field_asks_for(keyword, field, allowed):
 
 def test_the_motion_of_a_joint_is_described():
     """In words, variant by variant, and as data for programs; other kinds have none."""
-    assert "motion  1 rotation about a_j, constant in body j" in described("rev")
-    assert "motion  with slip = z: refused: its 1 row costs" in described("disk", width=120)
+    assert "method joint  1 rotation about a_j, constant in body j" in described("rev")
+    assert "method joint  with slip = z: rows stay: its 1 row costs" in described("disk", width=120)
     (univ,) = json.loads(described("univ", "--json"))["types"]
     (motion,) = univ["motions"]
     assert motion["parts"] == [

@@ -88,7 +88,7 @@ def test_a_comparison_with_nan_is_nan_and_a_branch_that_is_not_taken_is_not():
         ("f'{t}'", "Python syntax JoinedStr"),
         ("t[0]", "named by a dot"),
         ("t if t else t", "where(condition, value, otherwise)"),
-        ("t ^ 2", "a power is written **"),
+        ("t ^ 2", "has the operator ^, no arithmetic; a power is written **"),
         ("t, t", "without commas"),
         ("(x := t)", "Python syntax NamedExpr"),
         ("t; t", "is no expression"),

@@ -21,9 +21,9 @@ from dap3d_core.testing.kit import type_motions
 from dap3d_forces.weight import Weight
 from dap3d_joints.planar import Planar
 
-ON_TIME = "refused: its rows depend on time"
-ONE_ROW = "refused: its 1 row costs less than 5 joint coordinates"
-ON_VELOCITY = "refused: it has rows of the velocity level"
+ON_TIME = "rows stay: its rows depend on time"
+ONE_ROW = "rows stay: its 1 row costs less than 5 joint coordinates"
+ON_VELOCITY = "rows stay: it has rows of the velocity level"
 INSTALLED = {
     "rev": ["1 rotation about a_j, constant in body j"],
     "sph": ["3 rotations about P_j, constant in body j"],
@@ -43,19 +43,19 @@ INSTALLED = {
     "rel-rot": [ON_VELOCITY, ON_VELOCITY],
     "rel-tran": [ON_VELOCITY, ON_VELOCITY],
     "planar": ["2 translations along n_j and m_j and 1 rotation about a_j, constant in body j"],
-    "parallel": ["refused: its 2 rows cost less than 4 joint coordinates"],
-    "inline": ["refused: its 2 rows cost less than 4 joint coordinates"],
+    "parallel": ["rows stay: its 2 rows cost less than 4 joint coordinates"],
+    "inline": ["rows stay: its 2 rows cost less than 4 joint coordinates"],
     "inplane": [ONE_ROW],
-    "oncurve": ["refused: it has unknowns of its own: s"] * 2,
-    "cv": ["refused: the axes of its free motions are constant in neither body"],
+    "oncurve": ["rows stay: it has unknowns of its own: s"] * 2,
+    "cv": ["rows stay: the axes of its free motions are constant in neither body"],
     "motor": [ON_TIME, *[ON_VELOCITY] * 2, ON_TIME, *[ON_VELOCITY] * 2],
-    "couple": ["refused: it joins three bodies"],
+    "couple": ["rows stay: it joins three bodies"],
     "gear": [ONE_ROW] * 2,
     "rack": [ONE_ROW],
-    "belt": ["refused: it joins three bodies"],
-    "cable": ["refused: it joins three bodies"] * 4 + [ON_TIME] * 2,  # two lists each
-    "tendon": ["refused: it joins three bodies"] * 2,
-    "follow": ["refused: it joins three bodies"] * 4,
+    "belt": ["rows stay: it joins three bodies"],
+    "cable": ["rows stay: it joins three bodies"] * 4 + [ON_TIME] * 2,  # two lists each
+    "tendon": ["rows stay: it joins three bodies"] * 2,
+    "follow": ["rows stay: it joins three bodies"] * 4,
     "point-on-plane": [ONE_ROW],
     "point-on-surface": [ONE_ROW],
 }
@@ -96,12 +96,12 @@ OWN = {
     ),
     OnGround: "1 rotation about a_i, constant in body i",
     Shelf: "1 translation along (1, 0, 0), constant in ground",
-    Parabola: "refused: the axes of its free motions are constant in neither body",
-    RepeatedRow: "refused: its rows depend on each other where C = 0",
-    Upright: "refused: its rows depend on where ground is",
+    Parabola: "rows stay: the axes of its free motions are constant in neither body",
+    RepeatedRow: "rows stay: its rows depend on each other where C = 0",
+    Upright: "rows stay: its rows depend on where ground is",
     Rising: ON_TIME,
-    Undefined: "refused: no pose with C = 0 was found from the one given",
-    Either: "refused: its motion is another for other values of its fields",
+    Undefined: "rows stay: no pose with C = 0 was found from the one given",
+    Either: "rows stay: its motion is another for other values of its fields",
 }
 
 
@@ -115,7 +115,7 @@ def test_motion_of_installed_types(keyword):
     motions = type_motions(dap.load_registry().get("joint", keyword))
     assert [motion.words for motion in motions] == INSTALLED[keyword]
     assert [motion.parts is None for motion in motions] == [
-        words.startswith("refused") for words in INSTALLED[keyword]
+        words.startswith("rows stay") for words in INSTALLED[keyword]
     ]
 
 
