@@ -51,8 +51,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     joints = read_elements(report, geometry, "joints", types, functions)
     forces = read_elements(report, geometry, "forces", types, functions)
     _check_together(report, joints, forces)
-    materials = _read_materials(report)
-    others = joints, forces
+    materials, others = _read_materials(report), (joints, forces)
     contacts = _read_contacts(report, bodies, geometry, types, functions, others, materials)
     collisions = _check_shapes_and_outputs(report, bodies, joints, materials)
     left = bool(contacts or collisions)
