@@ -152,7 +152,8 @@ def solve(s: StepArrays, tolerance: float) -> bool:
 
     Args:
         s: with velocities ``free`` that fit the joints; ``bias`` is added to velocities, of which
-            normal ones are not to become negative then; ``x``, ``y`` are tried first.
+            normal ones are not to become negative then; ``x``, ``y`` are tried first;
+            ``free_speed`` is what joints ask of D v.
         tolerance: of the residual, a part of the largest impulse.
     """
     worst = 0.0
@@ -179,12 +180,9 @@ def solve_group(s: StepArrays, tolerance: float) -> bool:
         b = s.used[q]
         for k in range(3):
             s.least = max(s.least, LEAST_IMPULSE * s.mass[b] * abs(s.free[b, k]))
-    for n in range(s.row_count):
-        k = s.rows[n]
-        s.free_speed[k] = speed_of(s, k, s.free)
-        if s.chosen_count == 0:
-            s.y[k] = 0.0
     if s.chosen_count == 0:
+        for n in range(s.row_count):
+            s.y[s.rows[n]] = 0.0
         return True
     take_own(s)
     if few or joined:
@@ -203,8 +201,6 @@ def solve_group(s: StepArrays, tolerance: float) -> bool:
             s.residual = newton(s, aim, False)
         if few and joined and s.residual > tolerance and not refine_held(s, tolerance, aim):
             return False
-        if joined and s.residual > tolerance:
-            s.residual = newton(s, aim, False, True)
     if s.carries == 0 and judge(s) > tolerance and not joined:
         sweep(s, SWEEPS, max(tolerance, NEAR), RELAX)
         if not finish(s, tolerance):
