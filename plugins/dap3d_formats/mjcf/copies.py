@@ -4,8 +4,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import attrs
+import numpy as np
 
-from dap3d_core.interface.formats import WORLD, FormatError, Frame, Source, XmlElement, quaternion
+from dap3d_core.interface.formats import WORLD, FormatError, Source, XmlElement, quaternion
 from dap3d_formats.element_table import note_elements
 from dap3d_formats.mjcf.document import Document
 from dap3d_formats.mjcf.elements import CONTACTS, MJCF
@@ -24,8 +25,9 @@ Refers = Callable[[str, str], bool]
 def read_document(source: Source) -> Document:
     """The document of a file, with remarks on it; replicas and attached models are in place.
 
-    Replica k has k times the offset and the rotation of the element, accumulated; names end in
-    the separator and k, with zeros before it so that all are of one length. Tendons, equalities,
+    Replica k is turned by k times the Euler angles of the element, and its offset from the one
+    before is in the axes of that; names end in the separator and k, with zeros before it so that
+    all are of one length. Tendons, equalities,
     actuators and pairs that name one of these are copied with it.
 
     Of an attached model what its world holds, or one body with all below it, is put in a frame in
@@ -130,19 +132,19 @@ class _Copier:
             raise FormatError(f"count = {number:g} should be an integer above 0", element.place)
         count = int(number)
         self._count(count * _size(element), element)
-        turn = self.document.rotation(element)
-        step = Frame(element.numbers("offset", 3, (0.0, 0.0, 0.0)), turn)
-        copies, pose, digits = [], Frame(), len(str(count))
+        offset = np.array(element.numbers("offset", 3, (0.0, 0.0, 0.0)))
+        copies, place, digits = [], np.zeros(3), len(str(count))
         suffixes = [f"{element.get('sep', '')}{k:0{digits}d}" for k in range(count)]
         self._copy_naming(set(_named(element)), suffixes)
-        for suffix in suffixes:
+        for k, suffix in enumerate(suffixes):
+            turn = np.array(self.document.euler(element, k))
             words = {
-                "pos": " ".join(map(repr, pose.r.tolist())),
-                "quat": " ".join(map(repr, quaternion(pose.A))),
+                "pos": " ".join(map(repr, place.tolist())),
+                "quat": " ".join(map(repr, quaternion(turn))),
             }
             frame = XmlElement("frame", words, element.place, element.children)
             copies.append(_suffixed(frame, suffix, set()))
-            pose = pose @ step
+            place = place + turn @ offset
         return copies
 
     def _count(self, copies: int, element: XmlElement) -> None:

@@ -175,17 +175,21 @@ class Document:
             x, y, z, angle = element.numbers("axisangle", 4)
             return axis_angle(unit((x, y, z), element), self.angle(angle, element))
         if "euler" in given:
-            angles = [self.angle(a, element) for a in element.numbers("euler", 3)]
-            sequence = self.compiler(element).attributes.get("eulerseq", "xyz")
-            if len(sequence) != 3 or set(sequence) - set("xyzXYZ"):
-                what = f"eulerseq = {sequence!r} should be three of x, y, z, X, Y, Z"
-                raise FormatError(what, element.place)
-            return euler_angles(angles, sequence)
+            return self.euler(element)
         if "xyaxes" in given:
             return _xyaxes(element)
         if "zaxis" in given:
             return along(unit(element.numbers("zaxis", 3), element))
         return Frame().A
+
+    def euler(self, element: XmlElement, times: int = 1) -> Any:
+        """The rotation by the Euler angles of an element, times a number."""
+        angles = element.numbers("euler", 3, (0.0, 0.0, 0.0))
+        sequence = self.compiler(element).attributes.get("eulerseq", "xyz")
+        if len(sequence) != 3 or set(sequence) - set("xyzXYZ"):
+            what = f"eulerseq = {sequence!r} should be three of x, y, z, X, Y, Z"
+            raise FormatError(what, element.place)
+        return euler_angles([times * self.angle(a, element) for a in angles], sequence)
 
 
 def _kind(tag: str) -> str:

@@ -211,9 +211,7 @@ class Geoms:
                 raise FormatError("the two ends of fromto are the same point", geom.place)
             axis = (ends[0] - ends[1]) / (2.0 * half)
             pose = Frame(ends.mean(axis=0), along(tuple(axis.tolist())))
-            size = (size[0], half) if count == 2 else (size[0], size[min(1, len(size) - 1)], half)
-            if kind in ("box", "ellipsoid") and len(geom.numbers("size")) == 1:
-                size = (size[0], size[0], half)
+            size = (size[0], half) if count == 2 else (size[0], size[0], half)
         if len(size) < count or min(size[:count]) <= 0.0:
             raise FormatError(f"size of a {kind} should be {count} numbers greater than 0",
                               geom.place)  # fmt: skip

@@ -184,15 +184,12 @@ class MjcfReader:
         """Mass and inertia of a body: given, or of its geoms."""
         compiler, element = self.document.compiler(body), body.first("inertial")
         rule = compiler.get("inertiafromgeom", "auto")
-        if element is not None and rule != "true":
-            inertial: Inertial | None = self._given(element)
-        elif rule == "false":
-            inertial = None
-        else:
+        inertial = self._given(element) if element is not None else None
+        if rule == "true" or (rule == "auto" and inertial is None):
             low, high = compiler.numbers("inertiagrouprange", 2, (0.0, 5.0))
             counted = [(g, f) for g, f in geoms if low <= g.number("group", 0.0) <= high]
             parts = [part for g, f in counted if (part := self.geoms.inertial(g, f)) is not None]
-            inertial = total_inertia(parts) if parts else None
+            inertial = total_inertia(parts) if parts else inertial
         return _bounded(inertial, compiler)
 
     def _given(self, element: XmlElement) -> Inertial:
@@ -259,8 +256,10 @@ class MjcfReader:
         if name in self.joints:
             raise FormatError(f"there are two joints {name}", element.place)
         self.joints[name] = element.scope
-        anchor = Frame(element.numbers("pos", 3, (0.0, 0.0, 0.0)))
-        joint = Joint(name, KINDS[type_], "", "", in_child=frame @ anchor, place=element.place)
+        anchor = frame @ Frame(element.numbers("pos", 3, (0.0, 0.0, 0.0)))
+        if KINDS[type_] == "ball":  # its coordinates are in the axes of the body
+            anchor = Frame(anchor.r)
+        joint = Joint(name, KINDS[type_], "", "", in_child=anchor, place=element.place)
         if element.name == "freejoint":  # it takes nothing from default classes
             return joint
         if joint.kind not in ("ball", "free"):

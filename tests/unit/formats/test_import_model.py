@@ -167,6 +167,41 @@ def test_replicas_are_turned_and_moved_one_after_the_other(tmp_path):
         np.testing.assert_allclose(rotation(np.array(body.p)), turned, atol=1e-15)
 
 
+def test_replicas_are_turned_by_multiples_of_their_euler_angles(tmp_path):
+    """Places and quaternions as of MuJoCo 4.0.0 (body_pos, body_quat), to the digits printed."""
+    turned = '<replicate count="3" offset="0.3 -0.01 0.26" euler="80 -50 65">' + SPOKE
+    scene, _ = imported(tmp_path, f"<worldbody>{turned}</replicate></worldbody>")
+    last = scene.bodies["b2"]
+    A = rotation(np.array([0.7309, 0.1470, -0.6299, -0.2177]))
+    place = np.array([0.1882, -0.2306, 0.5707])
+    np.testing.assert_allclose(rotation(np.array(last.p)), A, atol=3e-4)
+    np.testing.assert_allclose(last.r, place + A @ scene.bodies["b0"].r, atol=3e-4)
+
+
+def test_a_box_between_two_points_is_square(tmp_path):
+    """Other sizes than the first hold for neither edge: 8 * 0.1 * 0.1 * 0.5 * 1000 kg."""
+    geom = '<geom type="box" fromto="0 0 0 0 0 1" size="0.1 0.3 0.7"/>'
+    scene, _ = imported(tmp_path, f"<worldbody><body><joint/>{geom}</body></worldbody>")
+    assert next(iter(scene.bodies.values())).mass == pytest.approx(40.0, rel=1e-14)
+
+
+def test_a_ball_in_a_turned_frame_has_coordinates_in_the_axes_of_the_body(tmp_path):
+    """A quarter turn about x of the body, whatever frame holds its joint."""
+    body = '<body name="b"><frame euler="20 30 40"><joint type="ball"/></frame>'
+    key = '<keyframe><key name="k" qpos="0.5 0.5 0 0"/></keyframe>'
+    text = f'<worldbody>{body}<geom size="0.1" pos="0 1 0"/></body></worldbody>{key}'
+    scene, _ = imported(tmp_path, text, key="k")
+    np.testing.assert_allclose(scene.bodies["b"].r, (0.0, 0.0, 1.0), atol=1e-15)
+
+
+def test_bodies_without_counted_geoms_keep_their_inertial(tmp_path):
+    given = '<inertial pos="0 0 0" mass="1.5" diaginertia="1 1 1"/>'
+    body = f'<body><joint/>{given}<geom size="0.1" group="4"/></body>'
+    compiler = '<compiler inertiafromgeom="true" inertiagrouprange="0 3"/>'
+    scene, _ = imported(tmp_path, f"{compiler}<worldbody>{body}</worldbody>")
+    assert next(iter(scene.bodies.values())).mass == 1.5
+
+
 def test_numbers_of_replicas_are_of_one_length(tmp_path):
     world = f'<replicate count="10" offset="2 0 0">{SPOKE}</replicate>'
     scene, _ = imported(tmp_path, f"<worldbody>{world}</worldbody>")

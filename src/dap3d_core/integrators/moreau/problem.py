@@ -9,12 +9,8 @@ one does, and each is solved as if it were alone.
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators.moreau.arrays import CONE, StepArrays, step_arrays
-from dap3d_core.integrators.moreau.contact_set import put_inertia, put_speeds
-from dap3d_core.integrators.moreau.gauss_seidel import (
-    copy_impulses,
-    sweep_bodies,
-    sweep_contacts,
-)
+from dap3d_core.integrators.moreau.contact_set import put_inertia
+from dap3d_core.integrators.moreau.gauss_seidel import sweep_bodies
 from dap3d_core.integrators.moreau.matrix import lay_out
 from dap3d_core.integrators.moreau.newton import (
     SMALL,
@@ -25,7 +21,6 @@ from dap3d_core.integrators.moreau.newton import (
     residual_of,
     rim_of,
     solve_round,
-    speed_of,
     times_inverse,
 )
 from dap3d_core.integrators.moreau.reduced import (
@@ -59,16 +54,13 @@ LEAST_IMPULSE = 1e-3
 #: at most.
 WEIGHT, ALONE_WEIGHT, MOST_WEIGHT = 1e5, 1e7, 1e10
 #: A round helps where it leaves less than this part of the residual. Where nothing else has led to
-#: a solution, rounds that leave less than the next ask for a larger weight: what hardly moves is
-#: felt with that alone. Rounds at most.
-HELPS, SLOW, ROUNDS = 0.5, 0.999, 40
+#: a solution, rounds that leave no more than the next ask for a larger weight: what hardly moves is
+#: felt with that alone, and shares of a load move far by it. Rounds at most.
+HELPS, WORSE, ROUNDS = 0.5, 1.1, 40
 #: Part of the tolerance to which a round is solved.
 INNER = 1e-2
 #: A residual from which a round that does not help is the last.
 SETTLED = 2e-14
-#: Of contacts held between bodies that joints guide: rounds of sweeps and Newton's method at most;
-#: passes in which joints answer, and are met; part of its own below which a contact cannot move.
-HELD_ROUNDS, ANSWERED, MET, HELD = 3, 2, 3, 1e-12
 #: Residual above which rows of light bodies are taken as those of what these carry.
 CARRIED = 1e-12
 
@@ -152,7 +144,8 @@ def solve(s: StepArrays, tolerance: float) -> bool:
 
     Args:
         s: with velocities ``free`` that fit the joints; ``bias`` is added to velocities, of which
-            normal ones are not to become negative then; ``x``, ``y`` are tried first.
+            normal ones are not to become negative then; ``x``, ``y`` are tried first;
+            ``free_speed`` is what joints ask of D v.
         tolerance: of the residual, a part of the largest impulse.
     """
     worst = 0.0
@@ -179,12 +172,9 @@ def solve_group(s: StepArrays, tolerance: float) -> bool:
         b = s.used[q]
         for k in range(3):
             s.least = max(s.least, LEAST_IMPULSE * s.mass[b] * abs(s.free[b, k]))
-    for n in range(s.row_count):
-        k = s.rows[n]
-        s.free_speed[k] = speed_of(s, k, s.free)
-        if s.chosen_count == 0:
-            s.y[k] = 0.0
     if s.chosen_count == 0:
+        for n in range(s.row_count):
+            s.y[s.rows[n]] = 0.0
         return True
     take_own(s)
     if few or joined:
@@ -203,8 +193,6 @@ def solve_group(s: StepArrays, tolerance: float) -> bool:
         if s.residual > max(aim, CARRIED) and s.light_count > 0:
             take_carried(s)
             s.residual = newton(s, aim, False)
-        if few and joined and s.residual > tolerance and not refine_held(s, tolerance, aim):
-            return False
         if joined and s.residual > tolerance:
             s.residual = newton(s, aim, False, True)
     if s.carries == 0 and judge(s) > tolerance and not joined:
@@ -262,48 +250,6 @@ def finish(s: StepArrays, tolerance: float) -> bool:
     return True
 
 
-@compiled
-def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
-    """Improve impulses by sweeps, then Newton's method, to a tolerance; False without room."""
-    m, best = s.chosen_count, s.residual
-    copy_impulses(s.x, s.y, s.kept, s.y_kept, s.contact_count)
-    for _ in range(HELD_ROUNDS):
-        if not factor_joints(s):
-            return False
-        put_felt(s, ANSWERED)
-        for p in range(m):
-            c = s.chosen[p]
-            own = s.own_held[c]
-            for r in range(3):
-                for q in range(3):
-                    own[3 * r + q] = s.felt[3 * p + r, 3 * p + q]
-            felt = own[0] if s.kind[c] == CONE else own[0] + own[4] + own[8]
-            own[0] = 0.0 if felt * s.r[c] < HELD else max(own[0], TINY)
-        for _ in range(MET):
-            meet_joints(s)
-        put_velocities(s, s.v)
-        for p in range(m):
-            c = s.chosen[p]
-            put_speeds(s, c, s.v)
-            s.rim[c] = 0.0 if s.kind[c] == CONE else rim_of(s, c, s.x, s.y)
-        sweep_contacts(s.chosen[:m], s.felt, s.own_held, s.u, s.kind, s.under, s.mu, s.rim,
-                       s.x, SWEEPS, aim)  # fmt: skip
-        for _ in range(MET):
-            meet_joints(s)
-        if not lay_out(s, s.dense_size):
-            return False
-        s.residual = newton(s, aim, False)
-        if s.residual < best:
-            best = s.residual
-            copy_impulses(s.x, s.y, s.kept, s.y_kept, s.contact_count)
-        else:
-            copy_impulses(s.kept, s.y_kept, s.x, s.y, s.contact_count)
-            s.residual = best
-        if best <= tolerance:
-            break
-    return True
-
-
 # ------------------------------------------------------------------ rounds
 
 
@@ -334,14 +280,15 @@ def newton(s: StepArrays, tolerance: float, is_reduced: bool, raises: bool = Fal
             exchange(s)
         new = residual_after(s, is_reduced)
         helps = new <= HELPS * left
-        if helps or (raises and new < SLOW * left):
+        if helps or (raises and new < WORSE * left and weight < MOST_WEIGHT):
             weight = min(weight / LESS, max(most, weight) if helps else MOST_WEIGHT)
         else:
             weight *= LESS
-        if new >= left:
+        if new >= (WORSE if raises else 1.0) * left:
             exchange(s)
             put_velocities(s, s.v)
-        left = min(left, new)
+        else:
+            left = new
         if weight < LEAST or (left <= SETTLED and not helps and not is_reduced):
             break
     return left

@@ -78,6 +78,10 @@ SAME_TIME = 1e-9
 RENEWED, FOLLOWED, MOST_STEPS = 3, 2.0, 100
 #: Margin of contacts, as parts of the way of a step, and m of a scene of ordinary size.
 MARGIN, LEAST_MARGIN = 1.2, 1e-6
+#: Gaps and overlaps, m of a scene of ordinary size, of what contacts carry and joints have moved.
+MOVED_BY_JOINTS = 1e-9
+#: Times that joints are fitted to the velocities found, where these leave a residual.
+FITS = 3
 #: Stages of a step that waits for room: the trial state is that without contacts; it is that where
 #: bodies have moved to, but may overlap; forces at the start are yet to be found, before the steps
 #: or for a row alone, with no step.
@@ -218,20 +222,28 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         work.t_stop, work.status, s.stage = work.t, DRIVEN, 0
         return False
     order_memory(work.memory, s.slots)
-    if stay_closed(work, s):
+    turns = stay_closed(work, s)
+    if turns:
         if not turn_rows(work.t + 0.5 * s.h, put_middle(work, s), s, system, loops):
             return False
     elif s.declared_gap.size == 0 and s.y.size > 0:
         evaluate_rows(work.t, y, s, system, loops)
     for c in range(s.touch_count if s.resistance_count > 0 else 0):
         put_resistances(c, s)
+    for k in range(s.y.size):
+        s.free_speed[k] = speed_of(s, k, s.free)
+    left = FITS if s.y.size > 0 else 0
     recall(work, s)
     while True:
         prepare_problem(s)
         if not solve(s, work.rtol):
             return False
         if not let_slip(s):
-            break
+            if s.residual <= work.rtol or left == 0:
+                break
+            left -= 1
+            fit_joints(work, s, turns, system, loops)
+            recall(work, s)
     if any_collides:
         put_flies(s)
         if not limit_bounces(s, work.rtol):
@@ -307,18 +319,26 @@ def deepest_of(s: StepArrays) -> float:
 
 @compiled
 def stay_closed(work: Any, s: StepArrays) -> bool:
-    """Mark the contacts that stay closed and move, by velocities ``end`` expected; True if any."""
+    """Mark the contacts that stay closed and move, by velocities ``end`` expected; True if any.
+
+    What joints have moved a contact that pushed by is taken back: gaps to one side alone would
+    ask of a body that several contacts carry what none of them allows.
+    """
     found, least = False, TURNING * s.length
     for b in range(1, s.end.shape[0]):
         for k in range(6):
             s.end[b, k] = s.free[b, k] + s.h * work.pushed[b, k]
     for c in range(s.law_count):
         i, j = s.bodies[c, 0], s.bodies[c, 1]
+        if s.kind[c] != CONE or s.collides[c] != 0:
+            continue
+        if s.slots[slot_of(work.memory, s.slots, s.key[c])] < 0:
+            continue
+        if abs(s.gap[c]) <= MOVED_BY_JOINTS * s.length and s.hit[max(i, j)] == NOT_HIT:
+            s.bias[c, 0] = s.gap[c] / s.h
         way = s.h * (speed_at(s, i) + speed_at(s, j))
-        if s.kind[c] == CONE and s.collides[c] == 0 and way > least:
-            pushed = is_pushed(work, i) or is_pushed(work, j)
-            if pushed and s.slots[slot_of(work.memory, s.slots, s.key[c])] >= 0:
-                s.collides[c], found = STAYS, True
+        if way > least and (is_pushed(work, i) or is_pushed(work, j)):
+            s.collides[c], found = STAYS, True
     return found
 
 
@@ -347,6 +367,37 @@ def put_middle(work: Any, s: StepArrays) -> Floats:
     for b in range(1, s.end.shape[0]):
         normalise(middle, coordinate_offset(b) + 3)
     return middle
+
+
+@compiled
+def fit_joints(work: Any, s: StepArrays, turns: bool, system: System, loops: Any) -> None:
+    """Put what joints ask of D v at the end of the step as they turn with the velocities found.
+
+    Free motion turns them differently: in a loop that contacts close no velocities fit both.
+    """
+    y, state, part = work.state[Y], s.slopes[: work.state.shape[1]], 0.5 if turns else 1.0
+    if not turns:
+        copy(state, y)
+    give_velocities(state, s.v)
+    evaluate_rows(work.t + (1.0 - part) * s.h, state, s, system, loops)
+    for k in range(s.y.size):
+        row = system.row[k]
+        s.free_speed[k] = system.nu[row] + part * s.h * system.gamma[row]
+
+
+@compiled
+def give_velocities(y: Floats, v: Floats) -> None:
+    """Give an integrated state velocities v of bodies, in global axes."""
+    n = v.shape[0] - 1
+    for b in range(1, n + 1):
+        f, p, w = velocity_offset(b, n), y[coordinate_offset(b) :], v[b]
+        a, c, d = axes_of(p, 0)
+        e, g, h = axes_of(p, 1)
+        i, k, m = axes_of(p, 2)
+        y[f], y[f + 1], y[f + 2] = w[0], w[1], w[2]
+        y[f + 3] = a * w[3] + e * w[4] + i * w[5]
+        y[f + 4] = c * w[3] + g * w[4] + k * w[5]
+        y[f + 5] = d * w[3] + h * w[4] + m * w[5]
 
 
 @compiled
@@ -416,7 +467,7 @@ def part(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
             s.bias[c, 0], s.mu[c] = s.gap[c], 0.0
             s.x[c, 0] = s.x[c, 1] = s.x[c, 2] = s.bias[c, 1] = s.bias[c, 2] = 0.0
         for k in range(s.y.size):
-            s.y[k] = 0.0
+            s.y[k] = s.free_speed[k] = 0.0
         if not solve(s, NEAR):
             return False
         for b in range(1, s.v.shape[0]):
@@ -429,18 +480,11 @@ def part(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
 @compiled
 def finish(work: Any, s: StepArrays, functions: Any, system: System, loops: Any) -> None:
     """Make the trial state that of the end of the step."""
-    y, trial, n = work.state[Y], work.state[TRIAL], s.mass.size - 1
+    y, trial = work.state[Y], work.state[TRIAL]
     if s.is_solved != 0 and s.is_steady == 0 and s.first_state < y.size:
         follow_states(work, s, functions[0], system, loops)
-    for b in range(1, n + 1 if s.is_solved != 0 else 1):
-        f, end = velocity_offset(b, n), s.end[b]
-        a, c, d = axes_of(trial[coordinate_offset(b) :], 0)
-        e, g, h = axes_of(trial[coordinate_offset(b) :], 1)
-        i, k, m = axes_of(trial[coordinate_offset(b) :], 2)
-        trial[f], trial[f + 1], trial[f + 2] = end[0], end[1], end[2]
-        trial[f + 3] = a * end[3] + e * end[4] + i * end[5]
-        trial[f + 4] = c * end[3] + g * end[4] + k * end[5]
-        trial[f + 5] = d * end[3] + h * end[4] + m * end[5]
+    if s.is_solved != 0:
+        give_velocities(trial, s.end)
     work.segment_step += 1 if s.t1 >= end_of_step(work) else 0
     copy(work.state[OTHER], y)
     copy(y, trial)
