@@ -205,3 +205,18 @@ def move(y: Floats, c: int, dx: float, dy: float, dz: float, a: float, b: float,
     p3 = f * e3 + d * e0 + (a * e2 - b * e1)
     size = math.sqrt(p0 * p0 + p1 * p1 + p2 * p2 + p3 * p3)
     y[c + 3], y[c + 4], y[c + 5], y[c + 6] = p0 / size, p1 / size, p2 / size, p3 / size
+
+
+@compiled
+def give_velocities(y: Floats, v: Floats) -> None:
+    """Give an integrated state velocities v of bodies, in global axes."""
+    n = v.shape[0] - 1
+    for b in range(1, n + 1):
+        f, p, w = velocity_offset(b, n), y[coordinate_offset(b) :], v[b]
+        a, c, d = axes_of(p, 0)
+        e, g, h = axes_of(p, 1)
+        i, k, m = axes_of(p, 2)
+        y[f], y[f + 1], y[f + 2] = w[0], w[1], w[2]
+        y[f + 3] = a * w[3] + e * w[4] + i * w[5]
+        y[f + 4] = c * w[3] + g * w[4] + k * w[5]
+        y[f + 5] = d * w[3] + h * w[4] + m * w[5]

@@ -268,7 +268,7 @@ def newton(s: StepArrays, tolerance: float, is_reduced: bool, raises: bool = Fal
     most = MOST_WEIGHT if is_reduced else WEIGHT
     if is_reduced and left > tolerance:
         weight = ALONE_WEIGHT
-        put_felt(s, 1)
+        put_felt(s)
     for _ in range(ROUNDS):
         if left <= tolerance:
             break

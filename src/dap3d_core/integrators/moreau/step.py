@@ -6,10 +6,9 @@
 import math
 from typing import Any
 
-from dap3d_core.assembly.arrays import System, coordinate_offset, velocity_offset
+from dap3d_core.assembly.arrays import System, coordinate_offset
 from dap3d_core.integrators.moreau.arrays import CONE, STAYS, WHOLE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import (
-    axes_of,
     evaluate_rows,
     find_contacts,
     find_grips,
@@ -19,6 +18,7 @@ from dap3d_core.integrators.moreau.contact_set import (
 )
 from dap3d_core.integrators.moreau.free_motion import (
     follow_states,
+    give_velocities,
     largest_rate,
     move,
     move_freely,
@@ -232,18 +232,8 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         put_resistances(c, s)
     for k in range(s.y.size):
         s.free_speed[k] = speed_of(s, k, s.free)
-    left = FITS if s.y.size > 0 else 0
-    recall(work, s)
-    while True:
-        prepare_problem(s)
-        if not solve(s, work.rtol):
-            return False
-        if not let_slip(s):
-            if s.residual <= work.rtol or left == 0:
-                break
-            left -= 1
-            fit_joints(work, s, turns, system, loops)
-            recall(work, s)
+    if not fit_impulses(work, s, turns, system, loops):
+        return False
     if any_collides:
         put_flies(s)
         if not limit_bounces(s, work.rtol):
@@ -255,6 +245,24 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     for b in range(n + 1):
         copy(s.end[b], s.v[b])
     return True
+
+
+@compiled
+def fit_impulses(work: Any, s: StepArrays, turns: bool, system: System, loops: Any) -> bool:
+    """Solve for impulses, joints as they turn with the velocities found; False without room."""
+    left = FITS if s.y.size > 0 else 0
+    recall(work, s)
+    while True:
+        prepare_problem(s)
+        if not solve(s, work.rtol):
+            return False
+        if let_slip(s):
+            continue
+        if s.residual <= work.rtol or left == 0:
+            return True
+        left -= 1
+        fit_joints(work, s, turns, system, loops)
+        recall(work, s)
 
 
 @compiled
@@ -383,21 +391,6 @@ def fit_joints(work: Any, s: StepArrays, turns: bool, system: System, loops: Any
     for k in range(s.y.size):
         row = system.row[k]
         s.free_speed[k] = system.nu[row] + part * s.h * system.gamma[row]
-
-
-@compiled
-def give_velocities(y: Floats, v: Floats) -> None:
-    """Give an integrated state velocities v of bodies, in global axes."""
-    n = v.shape[0] - 1
-    for b in range(1, n + 1):
-        f, p, w = velocity_offset(b, n), y[coordinate_offset(b) :], v[b]
-        a, c, d = axes_of(p, 0)
-        e, g, h = axes_of(p, 1)
-        i, k, m = axes_of(p, 2)
-        y[f], y[f + 1], y[f + 2] = w[0], w[1], w[2]
-        y[f + 3] = a * w[3] + e * w[4] + i * w[5]
-        y[f + 4] = c * w[3] + g * w[4] + k * w[5]
-        y[f + 5] = d * w[3] + h * w[4] + m * w[5]
 
 
 @compiled
