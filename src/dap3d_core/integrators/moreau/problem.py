@@ -25,7 +25,6 @@ from dap3d_core.integrators.moreau.newton import (
     residual_of,
     rim_of,
     solve_round,
-    speed_of,
     times_inverse,
 )
 from dap3d_core.integrators.moreau.reduced import (

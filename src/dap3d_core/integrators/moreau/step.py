@@ -327,18 +327,31 @@ def stay_closed(work: Any, s: StepArrays) -> bool:
     for b in range(1, s.end.shape[0]):
         for k in range(6):
             s.end[b, k] = s.free[b, k] + s.h * work.pushed[b, k]
+    mark_moved_apart(s)
     for c in range(s.law_count):
         i, j = s.bodies[c, 0], s.bodies[c, 1]
         if s.kind[c] != CONE or s.collides[c] != 0:
             continue
         if s.slots[slot_of(work.memory, s.slots, s.key[c])] < 0:
             continue
-        if abs(s.gap[c]) <= MOVED_BY_JOINTS * s.length and s.hit[max(i, j)] == NOT_HIT:
+        moved = s.queue[i] + s.queue[j] > 0 and abs(s.gap[c]) <= MOVED_BY_JOINTS * s.length
+        if moved and s.hit[max(i, j)] == NOT_HIT:
             s.bias[c, 0] = s.gap[c] / s.h
         way = s.h * (speed_at(s, i) + speed_at(s, j))
         if way > least and (is_pushed(work, i) or is_pushed(work, j)):
             s.collides[c], found = STAYS, True
     return found
+
+
+@compiled
+def mark_moved_apart(s: StepArrays) -> None:
+    """Mark by 1 the bodies of which a gap that is to close is that of rounding, or of joints."""
+    for b in range(s.queue.size):
+        s.queue[b] = 0
+    for c in range(s.law_count):
+        if s.kind[c] == CONE and OVERLAP < s.gap[c] / s.length <= MOVED_BY_JOINTS:
+            s.queue[s.bodies[c, 0]] = s.queue[s.bodies[c, 1]] = 1
+    s.queue[0] = 0
 
 
 @compiled
