@@ -12,7 +12,7 @@ from typing import Any
 
 from dap3d_core.assembly.arrays import System, coordinate_offset, velocity_offset
 from dap3d_core.integrators.moreau.arrays import StepArrays
-from dap3d_core.integrators.moreau.contact_set import axes_of
+from dap3d_core.integrators.moreau.contact_set import axes_of, evaluate_rows
 from dap3d_core.integrators.stepping.integration_state import TRIAL, Function, Y
 from dap3d_core.integrators.stepping.vector_ops import copy
 from dap3d_core.kernels.array_types import Floats
@@ -189,6 +189,37 @@ def take_velocities(y: Floats, n: int, v: Floats) -> None:
             v[b, k] = y[f + k]
             a, c, d = axes_of(p, k)
             v[b, 3 + k] = a * y[f + 3] + c * y[f + 4] + d * y[f + 5]
+
+
+@compiled
+def fit_joints(work: Any, s: StepArrays, turns: bool, system: System, loops: Any) -> None:
+    """Put what joints ask of D v at the end of the step as they turn with the velocities found.
+
+    Free motion turns them differently: in a loop that contacts close no velocities fit both.
+    """
+    y, state, part = work.state[Y], s.slopes[: work.state.shape[1]], 0.5 if turns else 1.0
+    if not turns:
+        copy(state, y)
+    give_velocities(state, s.v)
+    evaluate_rows(work.t + (1.0 - part) * s.h, state, s, system, loops)
+    for k in range(s.y.size):
+        row = system.row[k]
+        s.free_speed[k] = system.nu[row] + part * s.h * system.gamma[row]
+
+
+@compiled
+def give_velocities(y: Floats, v: Floats) -> None:
+    """Give an integrated state velocities v of bodies, in global axes."""
+    n = v.shape[0] - 1
+    for b in range(1, n + 1):
+        f, p, w = velocity_offset(b, n), y[coordinate_offset(b) :], v[b]
+        a, c, d = axes_of(p, 0)
+        e, g, h = axes_of(p, 1)
+        i, k, m = axes_of(p, 2)
+        y[f], y[f + 1], y[f + 2] = w[0], w[1], w[2]
+        y[f + 3] = a * w[3] + e * w[4] + i * w[5]
+        y[f + 4] = c * w[3] + g * w[4] + k * w[5]
+        y[f + 5] = d * w[3] + h * w[4] + m * w[5]
 
 
 @compiled

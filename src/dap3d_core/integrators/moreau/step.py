@@ -6,10 +6,9 @@
 import math
 from typing import Any
 
-from dap3d_core.assembly.arrays import System, coordinate_offset, velocity_offset
+from dap3d_core.assembly.arrays import System, coordinate_offset
 from dap3d_core.integrators.moreau.arrays import CONE, STAYS, WHOLE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import (
-    axes_of,
     evaluate_rows,
     find_contacts,
     find_grips,
@@ -18,7 +17,9 @@ from dap3d_core.integrators.moreau.contact_set import (
     velocity_of,
 )
 from dap3d_core.integrators.moreau.free_motion import (
+    fit_joints,
     follow_states,
+    give_velocities,
     largest_rate,
     move,
     move_freely,
@@ -229,20 +230,8 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         return False
     for c in range(s.touch_count if s.resistance_count > 0 else 0):
         put_resistances(c, s)
-    for k in range(s.y.size):
-        s.free_speed[k] = speed_of(s, k, s.free)
-    left = FITS if s.y.size > 0 else 0
-    recall(work, s)
-    while True:
-        prepare_problem(s)
-        if not solve(s, work.rtol):
-            return False
-        if not let_slip(s):
-            if s.residual <= work.rtol or left == 0:
-                break
-            left -= 1
-            fit_joints(work, s, turns, system, loops)
-            recall(work, s)
+    if not solve_fitted(work, s, turns, system, loops):
+        return False
     if any_collides:
         put_flies(s)
         if not limit_bounces(s, work.rtol):
@@ -254,6 +243,25 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     for b in range(n + 1):
         copy(s.end[b], s.v[b])
     return True
+
+
+@compiled
+def solve_fitted(work: Any, s: StepArrays, turns: bool, system: System, loops: Any) -> bool:
+    """Solve the step's problem; turns: with rows halfway through the step. False without room."""
+    for k in range(s.y.size):
+        s.free_speed[k] = speed_of(s, k, s.free)
+    left = FITS if s.y.size > 0 else 0
+    recall(work, s)
+    while True:
+        prepare_problem(s)
+        if not solve(s, work.rtol):
+            return False
+        if not let_slip(s):
+            if s.residual <= work.rtol or left == 0:
+                return True
+            left -= 1
+            fit_joints(work, s, turns, system, loops)
+            recall(work, s)
 
 
 @compiled
@@ -379,37 +387,6 @@ def put_middle(work: Any, s: StepArrays) -> Floats:
     for b in range(1, s.end.shape[0]):
         normalise(middle, coordinate_offset(b) + 3)
     return middle
-
-
-@compiled
-def fit_joints(work: Any, s: StepArrays, turns: bool, system: System, loops: Any) -> None:
-    """Put what joints ask of D v at the end of the step as they turn with the velocities found.
-
-    Free motion turns them differently: in a loop that contacts close no velocities fit both.
-    """
-    y, state, part = work.state[Y], s.slopes[: work.state.shape[1]], 0.5 if turns else 1.0
-    if not turns:
-        copy(state, y)
-    give_velocities(state, s.v)
-    evaluate_rows(work.t + (1.0 - part) * s.h, state, s, system, loops)
-    for k in range(s.y.size):
-        row = system.row[k]
-        s.free_speed[k] = system.nu[row] + part * s.h * system.gamma[row]
-
-
-@compiled
-def give_velocities(y: Floats, v: Floats) -> None:
-    """Give an integrated state velocities v of bodies, in global axes."""
-    n = v.shape[0] - 1
-    for b in range(1, n + 1):
-        f, p, w = velocity_offset(b, n), y[coordinate_offset(b) :], v[b]
-        a, c, d = axes_of(p, 0)
-        e, g, h = axes_of(p, 1)
-        i, k, m = axes_of(p, 2)
-        y[f], y[f + 1], y[f + 2] = w[0], w[1], w[2]
-        y[f + 3] = a * w[3] + e * w[4] + i * w[5]
-        y[f + 4] = c * w[3] + g * w[4] + k * w[5]
-        y[f + 5] = d * w[3] + h * w[4] + m * w[5]
 
 
 @compiled
