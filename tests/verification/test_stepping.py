@@ -449,22 +449,27 @@ def test_a_servo_that_is_fast_for_the_step_makes_it_shorter():
     assert any("steps are 0.0015 s" in n and "at 1.3e+03 1/s" in n for n in run.notes)
 
 
-def test_an_arm_on_a_base_that_sticks_whose_hand_is_held():
+@pytest.mark.parametrize(
+    ("links", "link", "base"), [(7, 5.0, 50.0), (7, 1.0, 130.0), (10, 0.2, 300.0)]
+)
+def test_an_arm_on_a_base_that_sticks_whose_hand_is_held(links, link, base):
     """A loop of hinges between a weld and friction: rounds leave nearly all of their residual.
 
-    2e-8 of the largest impulse is left where such rounds end the search; limit: some roundings.
+    1e-8 to 1e-6 of the largest impulse is left where such rounds end the search, and where joints
+    that free motion has turned, or gaps to one side, ask for what a loop does not allow; limit:
+    some roundings.
     """
-    scene, links, reach = dap.Scene(name="braced"), 7, 0.2
+    scene, reach = dap.Scene(name="braced"), 0.2
     scene.add_material("rubber", mu=1.0)
     scene.add_collisions(material="rubber")
     scene.add_shape("plane", body="ground", collides=True, group=1, meets=1)
-    scene.add_body("base", mass=50.0, Jp=[1.5] * 3, r=[0.0, 0.0, 0.15])
+    scene.add_body("base", mass=base, Jp=[0.03 * base] * 3, r=[0.0, 0.0, 0.15])
     scene.add_shape("box", body="base", size=[0.5, 0.5, 0.3], collides=True, group=1, meets=1)
     scene.add_force("weight", "gravity")
     last, centre, end = "base", np.array([0.0, 0.0, 0.15]), np.array([0.0, 0.0, 0.3])
     for k in range(links):
         name, half = f"link{k}", reach * np.array([0.5, 0.0, 0.25 if k % 2 else -0.25])
-        scene.add_body(name, mass=5.0, Jp=[5.0 * reach**2 / 12.0] * 3, r=end + half)
+        scene.add_body(name, mass=link, Jp=[link * reach**2 / 12.0] * 3, r=end + half)
         scene.add_point(f"outer{k}", last, end - centre)
         scene.add_point(f"inner{k}", name, -half)
         axis = "z" if k % 2 else "y"

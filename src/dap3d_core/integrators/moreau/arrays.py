@@ -44,7 +44,7 @@ CONE, ALONE, WHOLE = range(3)
 STOPS, BOUNCES, STAYS = 1, 2, 3
 #: Arrays of which a row belongs to a contact.
 OF_CONTACTS = ("bodies", "key", "kind", "under", "group", "next_contact", "chosen", "J",
-               "moved", "own", "gap", "mu", "rim", "e", "bias", "r", "collides",
+               "moved", "own", "own_held", "gap", "mu", "rim", "e", "bias", "r", "collides",
                "closing", "x", "u", "z", "B", "B_factored", "push", "kept", "missing", "met",
                "x_bounce")  # fmt: skip
 
@@ -151,6 +151,7 @@ class StepArrays(Arrays):
     J: Matrix  # (c, 36) rows of the velocity of body i less that of j: normal, tangents
     moved: Matrix  # the same times M^-1
     own: Matrix  # (c, 9) J M^-1 J^T of each
+    own_held: Matrix  # the same with what joints answer
     gap: Floats
     mu: Floats  # of the cone
     rim: Floats  # friction besides, N s
@@ -197,9 +198,10 @@ class StepArrays(Arrays):
     row_place: Integers
     D: Matrix  # (entries, 6)
     s: Floats  # masses that they feel
-    y: Floats  # impulses; those tried, with a bounce, and of motion without contacts
+    y: Floats  # impulses; tried, kept, and of the last step; those of motion without contacts
     lead: Floats  # D v at the begin of a round, less that of motion without contacts, m/s
     pull: Floats
+    y_kept: Floats
     y_bounce: Floats
     y_free: Floats
     free_speed: Floats  # D v of motion without contacts, m/s
@@ -231,7 +233,7 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
     layout = model.row_layout
     scratch: dict[str, Any] = {
         **{name: np.zeros(k) for name in (
-            "s", "y", "lead", "pull", "y_bounce", "y_free", "free_speed")},
+            "s", "y", "lead", "pull", "y_kept", "y_bounce", "y_free", "free_speed")},
         **{name: np.zeros(k, dtype=np.int64) for name in ("next_row", "rows")},
         **{name: np.zeros((0, 0)) for name in ("felt", "answer")},
         "small": np.zeros(SMALL_SIZE**2 if k else 0),
@@ -312,7 +314,7 @@ def _of_bodies(model: Model) -> dict[str, Any]:
 def _of_contacts(room: int) -> dict[str, Any]:
     """Arrays of so many contacts."""
     widths = {"bodies": 2, "J": 36, "moved": 36, "met": MET,
-              **dict.fromkeys(("own", "B", "B_factored"), 9),
+              **dict.fromkeys(("own", "own_held", "B", "B_factored"), 9),
               **dict.fromkeys(("x", "u", "z", "bias", "push", "kept", "missing", "x_bounce"),
                               3)}  # fmt: skip
     whole = ("bodies", "key", "kind", "under", "group", "next_contact", "chosen", "collides")

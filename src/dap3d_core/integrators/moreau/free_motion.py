@@ -12,7 +12,7 @@ from typing import Any
 
 from dap3d_core.assembly.arrays import System, coordinate_offset, velocity_offset
 from dap3d_core.integrators.moreau.arrays import StepArrays
-from dap3d_core.integrators.moreau.contact_set import axes_of
+from dap3d_core.integrators.moreau.contact_set import axes_of, evaluate_rows
 from dap3d_core.integrators.stepping.integration_state import TRIAL, Function, Y
 from dap3d_core.integrators.stepping.vector_ops import copy
 from dap3d_core.kernels.array_types import Floats
@@ -192,19 +192,19 @@ def take_velocities(y: Floats, n: int, v: Floats) -> None:
 
 
 @compiled
-def move(y: Floats, c: int, dx: float, dy: float, dz: float, a: float, b: float, d: float) -> None:
-    """Move and turn the body at c by (dx, dy, dz), m, and (a, b, d), rad, in global axes."""
-    y[c], y[c + 1], y[c + 2] = y[c] + dx, y[c + 1] + dy, y[c + 2] + dz
-    half = 0.5 * math.sqrt(a * a + b * b + d * d)
-    part = 0.5 * (math.sin(half) / half if half > 0.0 else 1.0)
-    a, b, d, f = part * a, part * b, part * d, math.cos(half)
-    e0, e1, e2, e3 = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
-    p0 = f * e0 - (a * e1 + b * e2 + d * e3)
-    p1 = f * e1 + a * e0 + (b * e3 - d * e2)
-    p2 = f * e2 + b * e0 + (d * e1 - a * e3)
-    p3 = f * e3 + d * e0 + (a * e2 - b * e1)
-    size = math.sqrt(p0 * p0 + p1 * p1 + p2 * p2 + p3 * p3)
-    y[c + 3], y[c + 4], y[c + 5], y[c + 6] = p0 / size, p1 / size, p2 / size, p3 / size
+def fit_joints(work: Any, s: StepArrays, turns: bool, system: System, loops: Any) -> None:
+    """Put what joints ask of D v at the end of the step as they turn with the velocities found.
+
+    Free motion turns them differently: in a loop that contacts close no velocities fit both.
+    """
+    y, state, part = work.state[Y], s.slopes[: work.state.shape[1]], 0.5 if turns else 1.0
+    if not turns:
+        copy(state, y)
+    give_velocities(state, s.v)
+    evaluate_rows(work.t + (1.0 - part) * s.h, state, s, system, loops)
+    for k in range(s.y.size):
+        row = system.row[k]
+        s.free_speed[k] = system.nu[row] + part * s.h * system.gamma[row]
 
 
 @compiled
@@ -220,3 +220,19 @@ def give_velocities(y: Floats, v: Floats) -> None:
         y[f + 3] = a * w[3] + e * w[4] + i * w[5]
         y[f + 4] = c * w[3] + g * w[4] + k * w[5]
         y[f + 5] = d * w[3] + h * w[4] + m * w[5]
+
+
+@compiled
+def move(y: Floats, c: int, dx: float, dy: float, dz: float, a: float, b: float, d: float) -> None:
+    """Move and turn the body at c by (dx, dy, dz), m, and (a, b, d), rad, in global axes."""
+    y[c], y[c + 1], y[c + 2] = y[c] + dx, y[c + 1] + dy, y[c + 2] + dz
+    half = 0.5 * math.sqrt(a * a + b * b + d * d)
+    part = 0.5 * (math.sin(half) / half if half > 0.0 else 1.0)
+    a, b, d, f = part * a, part * b, part * d, math.cos(half)
+    e0, e1, e2, e3 = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
+    p0 = f * e0 - (a * e1 + b * e2 + d * e3)
+    p1 = f * e1 + a * e0 + (b * e3 - d * e2)
+    p2 = f * e2 + b * e0 + (d * e1 - a * e3)
+    p3 = f * e3 + d * e0 + (a * e2 - b * e1)
+    size = math.sqrt(p0 * p0 + p1 * p1 + p2 * p2 + p3 * p3)
+    y[c + 3], y[c + 4], y[c + 5], y[c + 6] = p0 / size, p1 / size, p2 / size, p3 / size

@@ -1,4 +1,8 @@
-"""Projected Gauss-Seidel on contacts: impulses, and velocities of bodies with them."""
+"""Projected Gauss-Seidel on contacts: impulses and velocities, of bodies or of the contacts.
+
+Of contacts held between bodies that joints guide impulses are not unique, and Newton's method has
+no way from far away: sweeps that count in what joints answer with have one.
+"""
 
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
@@ -51,6 +55,40 @@ def sweep_bodies(
             for k in range(6):
                 a[k] += moves[k] * d0 + moves[12 + k] * d1 + moves[24 + k] * d2
                 b[k] += moves[6 + k] * d0 + moves[18 + k] * d1 + moves[30 + k] * d2
+            change = max(change, abs(d0), abs(d1), abs(d2))
+            largest = max(largest, x[c, 0] if kind[c] == CONE else size_of(x[c]))
+        if change <= tolerance * largest:
+            return done + 1
+    return sweeps
+
+
+@compiled
+def sweep_contacts(
+    chosen: Integers, felt: Floats, own: Floats, u: Floats, kind: Integers, under: Integers,
+    mu: Floats, rim: Floats, x: Floats, sweeps: int, tolerance: float,
+) -> int:  # fmt: skip
+    """The same where joints answer as well: u = felt x + what there is without impulses.
+
+    Args:
+        chosen: the contacts of a group, n of m.
+        felt: (3 n, 3 n) how these feel each other, symmetric.
+        own: (m, 9) its diagonal blocks; contacts whose first number is zero are left as they are.
+        u: (m, 3) velocities with the impulses x, changed with them.
+        kind, under, mu, rim, x, sweeps, tolerance: as of ``sweep_bodies``.
+    """
+    for done in range(sweeps):
+        change, largest = 0.0, 1e-300
+        for place in range(chosen.size):
+            c = chosen[place]
+            if own[c, 0] == 0.0:
+                continue
+            if under[c] >= 0:
+                rim[c] = x[under[c], 0]
+            d0, d1, d2 = change_of(own[c], kind[c], mu[c], rim[c], x[c], u[c, 0], u[c, 1], u[c, 2])
+            p, q, r = felt[3 * place], felt[3 * place + 1], felt[3 * place + 2]
+            for k in range(chosen.size):
+                for s in range(3):
+                    u[chosen[k], s] += p[3 * k + s] * d0 + q[3 * k + s] * d1 + r[3 * k + s] * d2
             change = max(change, abs(d0), abs(d1), abs(d2))
             largest = max(largest, x[c, 0] if kind[c] == CONE else size_of(x[c]))
         if change <= tolerance * largest:

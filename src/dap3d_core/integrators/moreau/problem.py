@@ -9,8 +9,12 @@ one does, and each is solved as if it were alone.
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators.moreau.arrays import CONE, StepArrays, step_arrays
-from dap3d_core.integrators.moreau.contact_set import put_inertia
-from dap3d_core.integrators.moreau.gauss_seidel import sweep_bodies
+from dap3d_core.integrators.moreau.contact_set import put_inertia, put_speeds
+from dap3d_core.integrators.moreau.gauss_seidel import (
+    copy_impulses,
+    sweep_bodies,
+    sweep_contacts,
+)
 from dap3d_core.integrators.moreau.matrix import lay_out
 from dap3d_core.integrators.moreau.newton import (
     SMALL,
@@ -61,6 +65,9 @@ HELPS, WORSE, ROUNDS = 0.5, 1.1, 40
 INNER = 1e-2
 #: A residual from which a round that does not help is the last.
 SETTLED = 2e-14
+#: Of contacts held between bodies that joints guide: rounds of sweeps and Newton's method at most;
+#: passes in which joints answer, and are met; part of its own below which a contact cannot move.
+HELD_ROUNDS, ANSWERED, MET, HELD = 3, 2, 3, 1e-12
 #: Residual above which rows of light bodies are taken as those of what these carry.
 CARRIED = 1e-12
 
@@ -193,6 +200,8 @@ def solve_group(s: StepArrays, tolerance: float) -> bool:
         if s.residual > max(aim, CARRIED) and s.light_count > 0:
             take_carried(s)
             s.residual = newton(s, aim, False)
+        if few and joined and s.residual > tolerance and not refine_held(s, tolerance, aim):
+            return False
         if joined and s.residual > tolerance:
             s.residual = newton(s, aim, False, True)
     if s.carries == 0 and judge(s) > tolerance and not joined:
@@ -250,6 +259,48 @@ def finish(s: StepArrays, tolerance: float) -> bool:
     return True
 
 
+@compiled
+def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
+    """Improve impulses by sweeps, then Newton's method, to a tolerance; False without room."""
+    m, best = s.chosen_count, s.residual
+    copy_impulses(s.x, s.y, s.kept, s.y_kept, s.contact_count)
+    for _ in range(HELD_ROUNDS):
+        if not factor_joints(s):
+            return False
+        put_felt(s, ANSWERED)
+        for p in range(m):
+            c = s.chosen[p]
+            own = s.own_held[c]
+            for r in range(3):
+                for q in range(3):
+                    own[3 * r + q] = s.felt[3 * p + r, 3 * p + q]
+            felt = own[0] if s.kind[c] == CONE else own[0] + own[4] + own[8]
+            own[0] = 0.0 if felt * s.r[c] < HELD else max(own[0], TINY)
+        for _ in range(MET):
+            meet_joints(s)
+        put_velocities(s, s.v)
+        for p in range(m):
+            c = s.chosen[p]
+            put_speeds(s, c, s.v)
+            s.rim[c] = 0.0 if s.kind[c] == CONE else rim_of(s, c, s.x, s.y)
+        sweep_contacts(s.chosen[:m], s.felt, s.own_held, s.u, s.kind, s.under, s.mu, s.rim,
+                       s.x, SWEEPS, aim)  # fmt: skip
+        for _ in range(MET):
+            meet_joints(s)
+        if not lay_out(s, s.dense_size):
+            return False
+        s.residual = newton(s, aim, False)
+        if s.residual < best:
+            best = s.residual
+            copy_impulses(s.x, s.y, s.kept, s.y_kept, s.contact_count)
+        else:
+            copy_impulses(s.kept, s.y_kept, s.x, s.y, s.contact_count)
+            s.residual = best
+        if best <= tolerance:
+            break
+    return True
+
+
 # ------------------------------------------------------------------ rounds
 
 
@@ -268,7 +319,7 @@ def newton(s: StepArrays, tolerance: float, is_reduced: bool, raises: bool = Fal
     most = MOST_WEIGHT if is_reduced else WEIGHT
     if is_reduced and left > tolerance:
         weight = ALONE_WEIGHT
-        put_felt(s)
+        put_felt(s, 1)
     for _ in range(ROUNDS):
         if left <= tolerance:
             break

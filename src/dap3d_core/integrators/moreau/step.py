@@ -17,6 +17,7 @@ from dap3d_core.integrators.moreau.contact_set import (
     velocity_of,
 )
 from dap3d_core.integrators.moreau.free_motion import (
+    fit_joints,
     follow_states,
     give_velocities,
     largest_rate,
@@ -230,9 +231,7 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         evaluate_rows(work.t, y, s, system, loops)
     for c in range(s.touch_count if s.resistance_count > 0 else 0):
         put_resistances(c, s)
-    for k in range(s.y.size):
-        s.free_speed[k] = speed_of(s, k, s.free)
-    if not fit_impulses(work, s, turns, system, loops):
+    if not solve_fitted(work, s, turns, system, loops):
         return False
     if any_collides:
         put_flies(s)
@@ -248,21 +247,22 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
 
 
 @compiled
-def fit_impulses(work: Any, s: StepArrays, turns: bool, system: System, loops: Any) -> bool:
-    """Solve for impulses, joints as they turn with the velocities found; False without room."""
+def solve_fitted(work: Any, s: StepArrays, turns: bool, system: System, loops: Any) -> bool:
+    """Solve the step's problem; turns: with rows halfway through the step. False without room."""
+    for k in range(s.y.size):
+        s.free_speed[k] = speed_of(s, k, s.free)
     left = FITS if s.y.size > 0 else 0
     recall(work, s)
     while True:
         prepare_problem(s)
         if not solve(s, work.rtol):
             return False
-        if let_slip(s):
-            continue
-        if s.residual <= work.rtol or left == 0:
-            return True
-        left -= 1
-        fit_joints(work, s, turns, system, loops)
-        recall(work, s)
+        if not let_slip(s):
+            if s.residual <= work.rtol or left == 0:
+                return True
+            left -= 1
+            fit_joints(work, s, turns, system, loops)
+            recall(work, s)
 
 
 @compiled
@@ -336,18 +336,31 @@ def stay_closed(work: Any, s: StepArrays) -> bool:
     for b in range(1, s.end.shape[0]):
         for k in range(6):
             s.end[b, k] = s.free[b, k] + s.h * work.pushed[b, k]
+    mark_moved_apart(s)
     for c in range(s.law_count):
         i, j = s.bodies[c, 0], s.bodies[c, 1]
         if s.kind[c] != CONE or s.collides[c] != 0:
             continue
         if s.slots[slot_of(work.memory, s.slots, s.key[c])] < 0:
             continue
-        if abs(s.gap[c]) <= MOVED_BY_JOINTS * s.length and s.hit[max(i, j)] == NOT_HIT:
+        moved = s.queue[i] + s.queue[j] > 0 and abs(s.gap[c]) <= MOVED_BY_JOINTS * s.length
+        if moved and s.hit[max(i, j)] == NOT_HIT:
             s.bias[c, 0] = s.gap[c] / s.h
         way = s.h * (speed_at(s, i) + speed_at(s, j))
         if way > least and (is_pushed(work, i) or is_pushed(work, j)):
             s.collides[c], found = STAYS, True
     return found
+
+
+@compiled
+def mark_moved_apart(s: StepArrays) -> None:
+    """Mark by 1 the bodies of which a gap that is to close is that of rounding, or of joints."""
+    for b in range(s.queue.size):
+        s.queue[b] = 0
+    for c in range(s.law_count):
+        if s.kind[c] == CONE and OVERLAP < s.gap[c] / s.length <= MOVED_BY_JOINTS:
+            s.queue[s.bodies[c, 0]] = s.queue[s.bodies[c, 1]] = 1
+    s.queue[0] = 0
 
 
 @compiled
@@ -375,22 +388,6 @@ def put_middle(work: Any, s: StepArrays) -> Floats:
     for b in range(1, s.end.shape[0]):
         normalise(middle, coordinate_offset(b) + 3)
     return middle
-
-
-@compiled
-def fit_joints(work: Any, s: StepArrays, turns: bool, system: System, loops: Any) -> None:
-    """Put what joints ask of D v at the end of the step as they turn with the velocities found.
-
-    Free motion turns them differently: in a loop that contacts close no velocities fit both.
-    """
-    y, state, part = work.state[Y], s.slopes[: work.state.shape[1]], 0.5 if turns else 1.0
-    if not turns:
-        copy(state, y)
-    give_velocities(state, s.v)
-    evaluate_rows(work.t + (1.0 - part) * s.h, state, s, system, loops)
-    for k in range(s.y.size):
-        row = system.row[k]
-        s.free_speed[k] = system.nu[row] + part * s.h * system.gamma[row]
 
 
 @compiled

@@ -67,7 +67,7 @@ def test_what_a_contact_feels_is_what_joints_let_it():
         s.felt[:] = s.answer[:] = 7.0
         take_own(s)
         assert factor_joints(s)
-        put_felt(s)
+        put_felt(s, 1)
         limit = 3e-10 * np.abs(J @ free @ J.T).max()
         if mu == 0.0:
             expected[1:] = expected[:, 1:] = 0.0
