@@ -1,7 +1,6 @@
 """The C text that belongs to one model: its memory, tables and variables."""
 
 import hashlib
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import groupby
 from typing import Any
@@ -20,6 +19,7 @@ from dap3d_core.kernels.compiler.units import Entry, Unit
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, V, W
 from dap3d_core.native.run.directions import Directions, PairEntry, PairUnit
 from dap3d_core.native.run.elements import Elements
+from dap3d_core.native.run.limits import OPEN, Limits
 from dap3d_core.native.run.outputs import Output
 from dap3d_core.native.run.prepared import Advance, ContactCode, PreparedRun
 from dap3d_core.simulation.events import contact_jumps
@@ -44,6 +44,7 @@ class Variable:
         start: its value at the start.
         words: of a parameter: words of the memory that it is, each with its sign.
         is_mean: an output that is no function of the state, but a mean of a step of contacts.
+        limits: of a parameter.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Variable:
     start: float = 0.0
     words: tuple[tuple[int, float], ...] = ()
     is_mean: bool = False
+    limits: Limits = OPEN
 
 
 def variables_of(
@@ -166,11 +168,6 @@ def data_of(
     lines += _start(prepared, variables)
     lines += _elements(prepared, elements)
     lines += _directions(prepared, elements, directions)
-    places = [place for v in variables for place in v.words]
-    lines += _table(
-        "static const struct { int64_t word; double sign; } places[]",
-        (f"{{{word}, {sign:g}}}" for word, sign in places or [(0, 1.0)]),
-    )
     lines += _table(
         "static const struct { double t; int jumps; double needs; } stops[]",
         (f"{{{s.t.hex()}, {int(s.jumps)}, {s.needs.hex()}}}" for s in prepared.stops)
@@ -226,21 +223,28 @@ def _defined(numbers: Mapping[str, Any]) -> list[str]:
 
 
 def _variables(variables: Sequence[Variable]) -> list[str]:
-    """The table of variables, with places of names in one text: addresses take more room."""
-    rows, first, size = [], 0, 0
+    """Tables of variables and parameters, with places in one text: addresses take more room."""
+    rows, places, first, size = [], [], 0, 0
     starts: dict[str, int] = {}
     for v in variables:
         place = first if v.kind in PARAMETERS else v.first
         first += len(v.words)
-        for text in (v.name, v.unit):
+        for text in (v.name, v.unit, *(words for _, words in v.limits.ends if words)):
             if text not in starts:
                 starts[text], size = size, size + len(text.encode()) + 1
         texts = f"{starts[v.name]}, {starts[v.unit]}"
         numbers = f"{place}, {len(v.words)}, {int(v.is_mean)}"
+        low, high = (f"{x!r}, {starts.get(words, 0)}" for x, words in v.limits.ends)
+        places += [f"{{{word}, {sign:g}, {low}, {high}}}" for word, sign in v.words]
         rows.append(f"{{{texts}, DAP3D_{v.kind.upper()}, {numbers}}}")
     texts_of = [f'    {c_text(text)} "\\0"' for text in starts]
     head = "static const struct { int name, unit, kind, first, count, is_mean; } variables[]"
-    return ["static const char texts[] =", *texts_of, ";", *_table(head, rows)]
+    head_of_places = (
+        "static const struct {\n    int64_t word;\n    double sign, low;\n    int below;\n"
+        "    double high;\n    int above;\n} places[]"
+    )
+    lines = ["static const char texts[] =", *texts_of, ";", *_table(head, rows)]
+    return lines + _table(head_of_places, places or ["{0, 1.0, 0.0, 0, 0.0, 0}"])
 
 
 def c_text(text: str) -> str:
@@ -482,18 +486,3 @@ def _integration(prepared: PreparedRun, k: int, one: Advance) -> str:
     words.append(str(place(work.switches[at.SIDE]) if work.switch_count else 0))
     words.append(str(place(work.stops) if prepared.stops else 0))
     return f"{{{', '.join(words)}, {int(one.integration.keeps_step)}, advance_{k}}}"
-
-
-def variables_header(prepared: PreparedRun, variables: Sequence[Variable]) -> str:
-    """The text of variables.h: references of the variables."""
-    title = prepared.compiled.scene.description or prepared.compiled.scene.name
-    lines = [f"/* Variables of the model: {title}", "   Units are in brackets. */", "enum {"]
-    used: set[str] = set()
-    for k, v in enumerate(variables):
-        word = re.sub(r"\W+", "_", v.name).strip("_").upper()
-        while word in used:
-            word += "_"
-        used.add(word)
-        note = f"{v.kind}: {v.name} [{v.unit}]".replace("*/", "* /")
-        lines.append(f"    V_{word} = {k}, /* {note} */")
-    return "\n".join([*lines, "};", ""])

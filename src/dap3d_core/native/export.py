@@ -17,10 +17,11 @@ from dap3d_core.interface.formats import ResultExporter
 from dap3d_core.kernels.compiler import background
 from dap3d_core.kernels.compiler.types import CompileError
 from dap3d_core.native.build import PLATFORMS, Platform, platforms_named
-from dap3d_core.native.c_source import PARAMETERS, Variable, data_of, variables_header, variables_of
+from dap3d_core.native.c_source import PARAMETERS, Variable, data_of, variables_of
 from dap3d_core.native.fmu import write_fmu
 from dap3d_core.native.library import Exported
 from dap3d_core.native.run.directions import Directions
+from dap3d_core.native.run.limits import Limits, limits_of
 from dap3d_core.native.run.outputs import Outputs, outputs_of
 from dap3d_core.native.run.parameters import places_of
 from dap3d_core.native.run.prepared import PreparedRun, refusal
@@ -173,7 +174,11 @@ def _parameters(
         parameters = parameters_named(prepared.compiled.checked, names)
     except SceneError as error:
         raise SceneError([attrs.evolve(m, key="parameters") for m in error.mistakes]) from None
-    return [_parameter(prepared, parameter, options, outputs) for parameter in parameters]
+    limits = limits_of(prepared, parameters, allow_code=bool(options.get("allow_code")))
+    return [
+        _parameter(prepared, parameter, within, options, outputs)
+        for parameter, within in zip(parameters, limits, strict=True)
+    ]
 
 
 def _refuse_shared(variables: Sequence[Variable]) -> None:
@@ -196,7 +201,11 @@ def _refuse_shared(variables: Sequence[Variable]) -> None:
 
 
 def _parameter(
-    prepared: PreparedRun, parameter: SceneParameter, options: dict[str, Any], outputs: Outputs
+    prepared: PreparedRun,
+    parameter: SceneParameter,
+    limits: Limits,
+    options: dict[str, Any],
+    outputs: Outputs,
 ) -> Variable:
     """A parameter as a variable.
 
@@ -214,6 +223,7 @@ def _parameter(
     return Variable(
         name, kind, parameter.unit, f"parameter {name}", int(places.moves_start),
         float(parameter.value or 0.0), tuple(places.words.items()),
+        limits=limits,
     )  # fmt: skip
 
 
@@ -244,6 +254,24 @@ def _write_folder(
 def library_name(name: str, target: Platform) -> str:
     """File name of a shared library."""
     return f"{'' if target.library == '.dll' else 'lib'}{name}{target.library}"
+
+
+def variables_header(prepared: PreparedRun, variables: Sequence[Variable]) -> str:
+    """The text of variables.h: references of the variables."""
+    title = prepared.compiled.scene.description or prepared.compiled.scene.name
+    lines = [f"/* Variables of the model: {title}", "   Units are in brackets. */", "enum {"]
+    used: set[str] = set()
+    for k, v in enumerate(variables):
+        word = re.sub(r"\W+", "_", v.name).strip("_").upper()
+        while word in used:
+            word += "_"
+        used.add(word)
+        note = "; ".join(
+            (f"{v.kind}: {v.name} [{v.unit}]", *(words for _, words in v.limits.ends if words))
+        )
+        note = note.replace("*/", "* /")
+        lines.append(f"    V_{word} = {k}, /* {note} */")
+    return "\n".join([*lines, "};", ""])
 
 
 def _words(model: Exported, platforms: Sequence[Platform]) -> dict[str, Any]:

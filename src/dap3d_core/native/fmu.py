@@ -153,6 +153,8 @@ def _variable(parent: Element, k: int, v: Variable, first: dict[str, int], fmi: 
     own = {} if v.unit in ("", "1", "SI") else {"unit": v.unit}
     if v.kind in ("input", "parameter", "fixed", "state"):
         own["start"] = repr(float(v.start))
+    for key, end in zip(("min", "max"), v.limits.closed, strict=True):
+        own |= {} if end is None else {key: repr(end)}
     if v.kind == "derivative":
         own["derivative"] = str(first["state"] + v.first + (1 if fmi == 2 else 0))
     if fmi == 3:

@@ -125,6 +125,14 @@ def _written(text, folder):
     return dap.load(folder / "cart.toml")
 
 
+def braced(folder):
+    """The cart, with a spring to a point beside its track."""
+    scene = _written(SPRING, folder)
+    scene.add_point("post", body="ground", sPp=(0.1, 1.0, 0.0))
+    scene.add_force("ptp", "brace", P_i="post", P_j="cart.O", k=20.0, l0=0.5)
+    return scene
+
+
 def test_inputs_are_held_as_in_a_run_step_by_step(tmp_path):
     scene = _written(SPRING, tmp_path)
     made, library = exported(scene, tmp_path, outputs=["cart.r", "cart.rd", "push"])
@@ -173,6 +181,34 @@ def test_a_parameter_is_set_before_a_run_or_in_its_course(tmp_path):
     # m r'' = -k r - c r' with the new k: its rate at once
     y, v = run["state.cart.r.x"], run["state.cart.rd.x"]
     assert run["der(state.cart.rd.x)"] == pytest.approx((-10.0 * y - 0.3 * v) / 2.0, rel=1e-14)
+
+
+def test_values_that_a_scene_refuses_are_refused(tmp_path):
+    """By name, value and limit, and nothing is set; values at the limits are taken."""
+    scene = braced(tmp_path)
+    inertias = [f"bodies.cart.Jp.{axis}" for axis in "xyz"]
+    names = ["forces.brace.l0", "bodies.cart.mass", *inertias]
+    made, library = exported(scene, tmp_path, parameters=names)
+    assert "l0 [m]; should be at least 0 */" in (made.path / "variables.h").read_text()
+    run = library.start(1.0)
+    for name, value, said in (
+        ("forces.brace.l0", -8.0, "forces.brace.l0 = -8: should be at least 0"),
+        ("bodies.cart.mass", 0.0, "bodies.cart.mass = 0: should be at least 1e-100"),
+        ("bodies.cart.mass", np.nan, "finite"),
+    ):
+        before = run[name]
+        with pytest.raises(ValueError, match=said):
+            run[name] = value
+        assert run[name] == before
+    run["forces.brace.l0"] = 0.0
+    for name in inertias:  # on the way the first two are no inertias
+        run[name] = 5.0
+    assert run.step_to(0.1)
+    for value in (-1.0, 10.1, 0.0):
+        run = library.start(1.0)
+        run[inertias[2]] = value
+        with pytest.raises(dap.SimulationError, match="inertias of a body should be positive"):
+            run.step_to(0.1)
 
 
 def test_a_parameter_of_a_table_is_one_as_well(tmp_path):

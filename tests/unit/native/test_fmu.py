@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from support.bouncing import bouncing
-from tests.unit.native.test_export import SPRING, _written, falling_ball
+from tests.unit.native.test_export import SPRING, _written, braced, falling_ball
 
 import dap3d_core as dap
 from dap3d_core.native.fmu import _in_base_units
@@ -177,6 +177,25 @@ def test_wrong_use_is_an_error_and_changes_nothing(tmp_path, fmi):
     with pytest.raises(fmpy.fmi1.FMICallException):  # before it is initialised
         fmu.doStep(0.0, 0.1)
     fmu.freeInstance()
+
+
+@VERSIONS
+def test_limits_of_parameters_are_described_and_kept(tmp_path, fmi):
+    from fmpy.validation import validate_fmu
+
+    scene = braced(tmp_path)
+    name, inertias = "forces.brace.l0", ["bodies.cart.Jp.x", "bodies.cart.Jp.y"]
+    made = written(scene, tmp_path, fmi=fmi, parameters=[name, *inertias])
+    assert validate_fmu(str(made.path)) == []
+    variables = fmpy.read_model_description(str(made.path)).modelVariables
+    described = {v.name: (v.min, v.max) for v in variables if v.causality == "parameter"}
+    assert described == {name: ("0.0", None)} | dict.fromkeys(inertias, (None, None))
+    fmu, at = begun(made, tmp_path, fmi)
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        (fmu.setReal if fmi == 2 else fmu.setFloat64)([at[name]], [-8.0])
+    fmu.freeInstance()
+    with pytest.raises(fmpy.fmi1.FMICallException):  # where initialisation ends
+        fmpy.simulate_fmu(str(made.path), stop_time=0.1, start_values={inertias[0]: 4.0})
 
 
 def begun(made, folder, fmi, kind="CoSimulation", **options):

@@ -91,8 +91,9 @@ DAP3D_API int dap3d_kind(int variable);
 DAP3D_API int dap3d_find(const char *name);
 
 /* Set an input or a parameter. It takes effect from the present time on. DAP3D_INVALID if the
-   variable is neither, the value is not finite, or a fixed parameter is set in the course of a run:
-   then the start is found anew, and outputs before it show what was set. */
+   variable is neither, the value is not finite or not within the limits that variables.h names, or a
+   fixed parameter is set in the course of a run: before it the start is found anew, and outputs show
+   what was set. Inertias of a body that are set one by one are checked where the run begins. */
 DAP3D_API int dap3d_set(dap3d_model *model, int variable, double value);
 
 /* The value of a variable at the present time; not a number for a reference that is none. */

@@ -202,7 +202,13 @@ FMI_API void FMI(FreeInstance)(I instance)
     free(F);
 }
 
-FMI_API S FMI(ExitInitializationMode)(I instance) { return F->is_initialised = true, fmi_ok; }
+FMI_API S FMI(ExitInitializationMode)(I instance)
+{
+    start(F->model);
+    if (integer_of(F->model)[I_status] > FINISHED)
+        return stopped(F->model), fmi_failed(F, fmi_error, dap3d_message(F->model));
+    return F->is_initialised = true, fmi_ok;
+}
 
 FMI_API S FMI(Terminate)(I instance) { return F->is_terminated = true, fmi_ok; }
 

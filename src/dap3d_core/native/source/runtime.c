@@ -18,7 +18,7 @@
 enum { RHS, PROJECT, REPORT, ACCEPTED, WATCH };
 /* Status of an integration (integration_state.py). */
 enum { RUNNING, FINISHED, STEP_FLOOR, NOT_FINITE, PROJECTION_FAILED, SWITCHED, CHATTERED, ENDED,
-       STIFF, JUMPED, STALLED, NO_ROOM, DRIVEN };
+       STIFF, JUMPED, STALLED, NO_ROOM, DRIVEN, NO_INERTIA };
 #define HORIZON 1e5
 #define ALIKE 1e-9
 #define LARGEST 1e100
@@ -47,7 +47,7 @@ struct dap3d_model {
     int64_t is_over;
     int (*between)(void *, double, double *); /* called at ends of steps, while one is going on */
     void *who;
-    char message[160];
+    char message[200];
     double sides[SWITCHES + 1]; /* of indicators, for integrators of others */
     double row[ROW + 1];     /* t, y and report at the present time */
     double outputs[OUTPUTS + 1];
@@ -277,8 +277,14 @@ int dap3d_set(dap3d_model *m, int v, double x)
         }
         return DAP3D_OK;
     }
-    double *value = numbers(m, places[variables[v].first].word);
-    if (*value == places[variables[v].first].sign * x)
+    int k = variables[v].first, is_low = x < places[k].low;
+    if (is_low || x > places[k].high) {
+        snprintf(m->message, sizeof m->message, "%.80s = %.9g: %s", texts + variables[v].name, x,
+                 texts + (is_low ? places[k].below : places[k].above));
+        return DAP3D_INVALID;
+    }
+    double *value = numbers(m, places[k].word);
+    if (*value == places[k].sign * x)
         return DAP3D_OK;
 #if FIXED
     if (kind == DAP3D_FIXED)
@@ -527,11 +533,24 @@ static void table_call(dap3d_model *m, int64_t word, double t, double *y, double
     f(t, y, STATES, out, size, m->w + SYSTEM, m->w + LOOPS);
 }
 
-/* The metric of a body, of its mass and inertia: 1/sqrt(m), and U = L^-T with J' = L L^T. */
-static void weigh(dap3d_model *m, int b)
+/* True if factor J + shift 1 is positive definite, by its leading minors. */
+static int is_positive(const double *J, double factor, double shift)
+{
+    double a = factor * J[0] + shift, b = factor * J[4] + shift, c = factor * J[8] + shift;
+    double d = factor * J[3], e = factor * J[6], f = factor * J[7], minor = a * b - d * d;
+    return a > 0.0 && minor > 0.0 && c * minor - a * f * f - b * e * e + 2.0 * d * e * f > 0.0;
+}
+
+/* The metric of a body, of its mass and inertia: 1/sqrt(m), and U = L^-T with J' = L L^T; whether
+   that is an inertia, of which none of three principal ones exceeds the sum of the others. */
+static int weigh(dap3d_model *m, int b)
 {
     const double *x = numbers(m, BODIES) + BODY_WIDTH * b, *J = x + BODY_JP;
     double *k = numbers(m, METRIC) + METRIC_WIDTH * b;
+    double largest = fmax(J[0], fmax(J[4], J[8])), half = 0.5 * (J[0] + J[4] + J[8]);
+    /* as scene/validate/bodies.py; half - J is that of the mass along the axes */
+    if (!is_positive(J, 1.0, -1e-14 * largest) || !is_positive(J, -1.0, half + 5e-10 * largest))
+        return 0;
     double a = sqrt(J[0]), c = J[3] / a, d = J[6] / a, e = sqrt(J[4] - c * c);
     double f = (J[7] - d * c) / e, g = sqrt(J[8] - d * d - f * f);
     k[0] = 1.0 / sqrt(x[BODY_MASS]);
@@ -539,6 +558,7 @@ static void weigh(dap3d_model *m, int b)
     k[2] = 0.0 - c * k[1] * k[4];
     k[5] = 0.0 - f * k[4] * k[6];
     k[3] = 0.0 - (d * k[1] + f * k[2]) * k[6];
+    return 1;
 }
 
 #if COMPLETES
@@ -572,7 +592,7 @@ static void take_given(dap3d_model *m, double *y)
     }
 }
 
-/* The start with the parameters that it depends on; whether there is one. */
+/* The start with the parameters that it depends on; RUNNING, or why there is none. */
 static int find_start(dap3d_model *m)
 {
     double *y = y_of(m), *k = numbers(m, METRIC), kept[7 * (BODY_COUNT + 1)], none[1] = {0.0};
@@ -588,11 +608,12 @@ static int find_start(dap3d_model *m)
         for (int b = 1; b <= BODY_COUNT; b++)
             memcpy(k + METRIC_WIDTH * b, kept + 7 * b, 8 * 7);
         if (out[START_OPEN] != 0.0 || !(out[START_PIVOT] > 1e-10))
-            return 0;
+            return PROJECTION_FAILED;
     }
     for (size_t n = 0; n < sizeof heavy / sizeof *heavy; n++)
         if (heavy[n] > 0) {
-            weigh(m, heavy[n]);
+            if (!weigh(m, heavy[n]))
+                return NO_INERTIA;
 #if COMPLETES
             invert(m, heavy[n]);
 #endif
@@ -600,7 +621,7 @@ static int find_start(dap3d_model *m)
     table_call(m, BEGIN, 0.0, y, none, 0);
     for (int n = 1; n < INTEGRATIONS; n++)
         memcpy(numbers(m, integrations[n].state), y, 8 * STATES);
-    return 1;
+    return RUNNING;
 }
 #endif
 
@@ -611,8 +632,9 @@ static void start(dap3d_model *m)
         return;
     m->has_begun = 1;
 #if FIXED
-    if (m->is_other && !find_start(m)) {
-        integer_of(m)[I_status] = PROJECTION_FAILED;
+    int status = m->is_other ? find_start(m) : RUNNING;
+    if (status != RUNNING) {
+        integer_of(m)[I_status] = status;
         real_of(m)[R_t_stop] = 0.0;
         return;
     }
@@ -685,7 +707,8 @@ static int stopped(dap3d_model *m)
         "rates or a state are not finite", "no state on the constraints was found",
         "a switch of the model ended the run", "a switch changed its sign again and again", "",
         "the scene is stiff", "joints hold a velocity that is to jump", "steps are so short that the run would not end",
-        "more contacts came near than the model has room for", "friction of a contact is negative"};
+        "more contacts came near than the model has room for", "friction of a contact is negative",
+        "inertias of a body should be positive, and none greater than the sum of the others"};
     int64_t status = integer_of(m)[I_status];
     double t = status == FINISHED ? real_of(m)[R_t] : real_of(m)[R_t_stop];
     m->is_over = status == SWITCHED || status == FINISHED ? OVER : FAILED;
@@ -694,7 +717,7 @@ static int stopped(dap3d_model *m)
         return say_failure(m, t), DAP3D_ERROR;
 #endif
     snprintf(m->message, sizeof m->message, "the run stopped at t = %.9g s: %s", t,
-             words[status >= 0 && status <= DRIVEN ? status : 0]);
+             words[status >= 0 && status <= NO_INERTIA ? status : 0]);
     return m->is_over == FAILED ? DAP3D_ERROR : DAP3D_ENDED;
 }
 
