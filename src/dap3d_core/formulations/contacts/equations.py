@@ -55,7 +55,7 @@ from dap3d_core.formulations.common.projection import project_onto
 from dap3d_core.formulations.contacts.watched_rates import store_watched, take_watched
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
-from dap3d_core.kernels.scalar_math import is_differentiated, where
+from dap3d_core.kernels.scalar_math import is_differentiated, where, with_slopes
 from dap3d_core.linear.least_squares import invert
 
 #: Compliance of a row as part of its squared length; how much less where passes do not converge,
@@ -100,14 +100,13 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     linearise(t, system, loops)
     zero(system.multipliers)
     contacts, size = system.contacts, system.acceleration.shape[0]
-    force, closed = system.friction[size : 2 * size], 0
+    applied, force, closed = system.friction[:size], system.friction[size : 2 * size], 0
     for c in range(contacts.shape[0]):
         closed |= mode_of(system, c) > _OPEN
         if is_given(system, c) or (contacts[c, LOADED] == 1 and is_sliding(system, c)):
             power += force_of(t, c, force, system.acceleration, system, loops)
     if closed == 0 and system.row.shape[0] == 3 * contacts.shape[0]:
         return power
-    applied = system.friction[:size]
     for k in range(size):
         applied[k] = system.acceleration[k]
     given = largest_given(system)
@@ -242,8 +241,7 @@ def add_columns(t: float, system: System, loops: Any) -> int:
         if is_sliding(system, c) and contacts[c, LOADED] == 0:
             own, force = column(system, count), system.friction[size : 2 * size]
             zero(own)
-            power = force_of_one(t, c, force, own[:size], system, loops)
-            own[own.shape[0] - POWER] = power
+            own[own.shape[0] - POWER] = force_of_one(t, c, force, own[:size], system, loops)
             zero(x)
             solve_rows(system, own[:size])
             for k in range(x.shape[0]):
@@ -292,9 +290,18 @@ def inverse(system: System, count: int) -> Floats:
 
 
 @compiled
-def add_friction(system: System, count: int) -> None:
-    """Add friction to ``acceleration`` and ``multipliers``, which were found without it."""
-    x, size = system.multipliers, system.acceleration.shape[0]
+def add_pass(system: System, count: int, again: bool) -> None:
+    """Solve for what ``acceleration`` leaves of the rows; what is found has its friction.
+
+    again: once more where passes have settled, for derivatives alone.
+    """
+    x, total, size = system.multipliers, system.total, system.acceleration.shape[0]
+    kept = system.friction[size : 2 * size]
+    for k in range(size if again else 0):
+        kept[k] = system.acceleration[k]
+    for k in range(x.shape[0]):
+        x[k] = system.gamma[k]
+    solve_rows(system, system.acceleration)
     N = pressing(system, count)
     for r in range(count):
         own = column(system, r)
@@ -302,7 +309,12 @@ def add_friction(system: System, count: int) -> None:
             system.acceleration[k] += N[r] * own[k]
         for k in range(x.shape[0]):
             x[k] += N[r] * own[size + k]
-        own[own.shape[0] - FORCE] += N[r]
+        before = own[own.shape[0] - FORCE]
+        own[own.shape[0] - FORCE] = with_slopes(before if again else before + N[r], before + N[r])
+    for k in range(size if again else 0):
+        system.acceleration[k] = with_slopes(kept[k], system.acceleration[k])
+    for k in range(x.shape[0]):
+        total[k] = with_slopes(total[k] if again else total[k] + x[k], total[k] + x[k])
 
 
 @compiled_into
@@ -323,15 +335,11 @@ def pressing(system: System, count: int) -> Floats:
 
 @compiled
 def solve_loads(system: System, count: int) -> None:
-    """Changes N of normal forces and loads, from ``multipliers`` found without them.
-
-    Not numbers where friction jams.
-    """
-    A = inverse(system, count)
-    N, rest = A[2 * count * count :], A[2 * count * count + count :]
-    for r in range(count):
-        N[r] = 0.0
-    settled, before, step, largest_load = 0, np.inf, 0.0, 0.0
+    """As ``pressing``, where loads of joints are among them; not numbers where friction jams."""
+    A, n = inverse(system, count), 2 * count * count
+    N, rest = A[n : n + count], A[n + count :]
+    zero(N)
+    settled, before, step, largest_load = False, np.inf, 0.0, 0.0
     for _ in range(LOAD_PASSES):
         for r in range(count):
             rest[r] = fill_load(system, count, r, A[2 * count * r :])
@@ -341,16 +349,15 @@ def solve_loads(system: System, count: int) -> None:
             change = 0.0
             for s in range(count):
                 change += A[2 * count * r + count + s] * rest[s]
-            N[r] += change
-            own = column(system, r)
-            step = max(step, abs(change))
+            N[r] = with_slopes(N[r] if settled else N[r] + change, N[r] + change)
+            own, step = column(system, r), max(step, abs(change))
             largest_load = max(largest_load, abs(N[r] + own[own.shape[0] - FORCE]))
         stands = step <= NOISE * largest_load and step > FALLING * before
-        if step <= LOAD_SETTLED * largest_load or stands:
-            settled += 1
-            if settled > 1 or not is_differentiated():
-                return  # derivatives follow a pass later
-        before = step
+        if settled:
+            return
+        settled, before = step <= LOAD_SETTLED * largest_load or stands, step
+        if settled and not is_differentiated():
+            return  # else a pass more, for derivatives alone
     if not step <= NOISE * largest_load:
         N[0] = np.inf - np.inf
 
@@ -368,9 +375,8 @@ def fill_load(system: System, count: int, r: int, A: Floats) -> float:
         row = pressed_row(system, c)
         rest = -x[row] - N[r]
         for s in range(count):
-            slope = column(system, s)[size + row]
-            rest -= slope * N[s]
-            A[s] += slope
+            rest -= column(system, s)[size + row] * N[s]
+            A[s] += column(system, s)[size + row]
         return rest
     square = 0.0
     for row in range(first, first + loads):
@@ -405,33 +411,27 @@ def are_independent(system: System) -> bool:
 def has_settled(system: System, count: int, given: float, part: float) -> bool:
     """``acceleration`` and ``multipliers`` from the forces in ``acceleration``, in passes.
 
-    In each what it finds for contacts that slide has its friction. given: the largest share. part:
-    of the factors. False where passes did not converge.
+    given: the largest share. part: of the factors. False where passes did not converge.
     """
-    x, total, rows = system.multipliers, system.total, system.total.shape[0]
-    before, change, found, settled = 0.0, 0.0, 0.0, 0
+    x, total, before, change, found = system.multipliers, system.total, 0.0, 0.0, 0.0
     zero(total)
     for k in range(PASSES):
-        for r in range(rows):
-            x[r] = system.gamma[r]
-        solve_rows(system, system.acceleration)
-        add_friction(system, count)
+        add_pass(system, count, False)
         if part == PART_OF_INDEPENDENT:
             return True
         change, found = 0.0, 0.0
-        for r in range(rows):
-            total[r] += x[r]
+        for r in range(x.shape[0]):
             if system.compliance[r] != 0.0:  # else a hub's place, or a row that is zero
                 of_row, of_all = abs(x[r]), abs(total[r])
                 change = where(of_row > change, of_row, change)
                 found = where(of_all > found, of_all, found)
         enough = SETTLED * (found + given if count > 0 else found)
         if change <= enough or (k > 0 and not change < FALLING * before):
-            if settled != 0 or not is_differentiated():
-                break
-            settled = 1  # derivatives follow a pass later
+            break
         before = change
-    for r in range(rows):
+    if is_differentiated():
+        add_pass(system, count, True)
+    for r in range(x.shape[0]):
         x[r] = total[r]
     return change <= NOISE * (found + given)
 

@@ -71,6 +71,64 @@ def test_values_of_many_kinds_of_scenes(scene, by):
         assert np.all(np.isfinite(s.of(f"{body}.r")))
 
 
+def rubbing(joint, **friction):
+    """A rod that swings on, slides along or turns about a joint with friction."""
+    slides = joint == "tran"
+    scene = dap.Scene(name=f"rubbing {joint}")
+    scene.add_force("weight", "gravity", gravity=9.81)
+    scene.add_body("b", mass=1.0, Jp=(0.01, 0.015, 0.02), r=(0.3, 0.0, 0.0),
+                   r_dot=(0.5, 0.0, 0.0) if slides else (0.0, 0.0, -0.6),
+                   w=(0.0, 0.0 if slides else 2.0, 0.0))  # fmt: skip
+    scene.add_point("A", "b", (-0.3, 0.0, 0.0))
+    axes = {"rev": {"a_i": "b.y", "a_j": "ground.y"}, "tran": {"a_j": "ground.x"}}
+    scene.add_joint(joint, "h", P_i="A", P_j="ground.O", **axes.get(joint, {}))
+    scene.add_force(*friction.pop("type", ("friction", "f")), joint="h", **friction)
+    return scene, list(friction)
+
+
+def rolling(**resists):
+    """A ball that slides, spins and comes to roll."""
+    scene = dap.Scene(name="rolling")
+    scene.add_force("weight", "gravity", gravity=9.81)
+    scene.add_body("b", mass=1.2, Jp=(0.004, 0.004, 0.004), r=(0.0, 0.0, 0.1),
+                   r_dot=(0.5, 0.2, 0.0), w=(1.0, 2.0, 3.0))  # fmt: skip
+    scene.add_contact("ball_plane", "f", P_i="b.O", radius=0.1, mu=0.3, **resists)
+    return scene, ["mu", *resists]
+
+
+RUBS = {"mu": 0.4, "radius": 0.05}
+
+
+@pytest.mark.every(5)
+@pytest.mark.parametrize("settings", [{"method": "lsq"}, {"method": "joint"},
+                                      {"integrator": "radau"}], ids=str)  # fmt: skip
+@pytest.mark.parametrize(
+    "made",
+    [
+        (rubbing, "rev", RUBS),
+        (rubbing, "rev", RUBS | {"v_tol": 0.01}),
+        (rubbing, "sph", RUBS | {"v_tol": 0.01}),
+        (rubbing, "tran", {"mu": 0.1}),
+        (rubbing, "tran", {"mu": 0.4, "v_tol": 0.01}),
+        (rubbing, "rev", {"type": ("rot_friction", "f"), "n_c": 0.9, "n_s": 1.2}),
+        (rubbing, "rev", {"type": ("rot_friction", "f"), "n_c": 0.9, "w_tol": 0.1}),
+        (rubbing, "tran", {"type": ("tran_friction", "f"), "f_c": 0.9, "f_s": 1.2}),
+        (rolling, {}),
+        (rolling, {"mu_roll": 0.003, "mu_spin": 0.002}),
+    ],
+    ids=lambda made: "-".join(map(str, (made[0].__name__, *made[1:]))),
+)
+def test_values_of_friction(made, settings):
+    """An iteration that goes on for derivatives leaves its values as they are."""
+    make, *joint, numbers = made
+    scene, names = make(*joint, **numbers)
+    kind = "contacts" if scene.contacts else "forces"
+    by = ["bodies.b.mass", *(f"{kind}.f.{name}" for name in names)][:3]
+    settings = settings | {"t_end": 0.6, "dt": 0.1, "rtol": 1e-8, "atol": 1e-10}
+    s = dap.sensitivities(scene, by, **settings)
+    assert arrays(s.result) == arrays(dap.simulate(scene, **settings))
+
+
 @pytest.mark.slow
 def test_more_directions_than_lanes():
     """Blocks of runs; each direction is what it is alone."""
