@@ -107,7 +107,7 @@ def solve_cone(c: Cone, tries: int) -> float:
     for k in range(tries):
         sweep(c, c.K, c.q, z, sweeps)
         sweeps = 4 * sweeps if k > 0 else SWEEPS
-        left = newton(c, c.K, c.q, z)
+        left = newton(c, c.K, c.q, z, scale)
         if left <= SOLVED * scale:
             break
     if tries == TRIES and not left <= SOLVED * scale:
@@ -122,17 +122,24 @@ def solve_cone(c: Cone, tries: int) -> float:
 
 @compiled
 def stretch(c: Cone) -> float:
-    """Stretch what friction in ellipses acts along until these are circles; the scale of x."""
+    """Stretch what friction in ellipses acts along until these are circles; the scale of x.
+
+    What a row of rounding changes of itself says nothing of that, but what its contact does, and of
+    friction without a normal its limit.
+    """
     scale = 0.0
     for i in range(3 * c.count):
         own = c.ratio[i // 3] if i % 3 == 2 else 1.0
         for k in range(3 * c.count):
             c.K[i, k] = own * c.A[i, k] * (c.ratio[k // 3] if k % 3 == 2 else 1.0)
         c.q[i], c.z[i] = own * c.b[i], c.x[i] / own if own > 0.0 else c.x[i]
-        scale = max(scale, abs(c.q[i] / max(c.K[i, i], TINY)))
     for k in range(c.count):
         c.r[k] = 1.0 / max(c.K[3 * k, 3 * k], c.K[3 * k + 1, 3 * k + 1],
                            c.K[3 * k + 2, 3 * k + 2], TINY)  # fmt: skip
+        has_normal = (c.gapless[k] == 0.0) & (c.K[3 * k, 3 * k] != 0.0)
+        most = np.inf if has_normal else c.mu[k] * c.more[k]
+        for i in range(3 * k, 3 * k + 3):
+            scale = max(scale, min(abs(c.q[i]) * c.r[k], most))
     return scale + TINY
 
 
@@ -165,10 +172,10 @@ def come_nearer(c: Cone, left: float, scale: float) -> float:
                 firm[i, i] += part * c.K[i, i]
                 moved[i] = c.q[i] - part * c.K[i, i] * y[i]
             sweep(c, firm, moved, y, CLOSER)
-            newton(c, firm, moved, y)
+            newton(c, firm, moved, y, scale)
             for k in range(n):
                 new[k] = y[k]
-            rest = newton(c, c.K, c.q, new)
+            rest = newton(c, c.K, c.q, new, scale)
             if rest < left:
                 left = rest
                 for k in range(n):
@@ -254,18 +261,16 @@ def sweep(c: Cone, A: Floats, b: Floats, x: Floats, sweeps: int) -> None:
 
 
 @compiled
-def newton(c: Cone, A: Floats, b: Floats, x: Floats) -> float:
+def newton(c: Cone, A: Floats, b: Floats, x: Floats, scale: float) -> float:
     """Semismooth Newton with a line search, in place; the residual."""
-    n, least = x.shape[0], 0.0
-    for k in range(n):
-        least = max(least, abs(b[k] / max(A[k, k], TINY)))
+    n = x.shape[0]
     residual_of(c, A, b, x, False)
     best = largest_residual(c, n)
     for _ in range(PASSES):
         largest = 0.0
         for k in range(n):
             largest = max(largest, abs(x[k]))
-        if (best <= RESIDUAL_ROUNDING * (largest + least + TINY)) | (not best < np.inf):
+        if (best <= RESIDUAL_ROUNDING * (largest + scale)) | (not best < np.inf):
             break
         residual_of(c, A, b, x, True)
         for k in range(n):

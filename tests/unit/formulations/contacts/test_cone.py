@@ -62,6 +62,23 @@ def test_rounding_of_the_rates_is_no_residual():
     assert np.abs(problem.A @ problem.x + b).max() < 1e-14
 
 
+def test_a_row_that_moves_nothing_says_nothing_of_the_size_of_a_solution():
+    """Of friction that holds a slider beside a rope without friction, at a right angle to a joint.
+
+    What that row changes of itself is rounding, of either sign, as is its rate.
+    """
+    G = np.array([[0.9, 0.0], [-0.4, 1.7], [-0.2, 1.8]])
+    A, b, problem = np.zeros((6, 6)), np.zeros(6), cone.cone_of(2)
+    rows = [1, 3, 4]
+    A[np.ix_(rows, rows)], b[rows] = G @ G.T, [0.5, -1.9, -1.8]
+    A[5, 5], b[5] = -2e-15, -1e-17
+    problem.count, problem.A[:], problem.b[:] = 2, A, b
+    problem.mu[:], problem.more[:] = [5.0, 0.0], [1.0, 0.0]
+    assert cone.solve_cone(problem, cone.TRIES) < 1e-12
+    held = np.linalg.solve(A[np.ix_([1, 3], [1, 3])], [-0.5, 1.9])
+    assert problem.x == pytest.approx([0.0, held[0], 0.0, held[1], 0.0, 0.0], rel=1e-13)
+
+
 def test_contacts_that_jam_each_other_have_no_solution():
     """Neither both forces (-161, -67), nor one alone (the other would accelerate by -52, -15)."""
     A = np.kron([[0.06037, -0.29260], [-0.26205, 0.48465]], np.diag([1.0, 0.0, 0.0]))
