@@ -56,6 +56,9 @@ def test_times_of_model_exchange_may_round_beyond_the_end(tmp_path, fmi):
     fmu, _ = begun(made, tmp_path, fmi, kind="ModelExchange")
     fmu.setTime(np.nextafter(5.0, 6.0))
     fmu.completedIntegratorStep()
+    for t in (np.nan, np.inf, -1.0):
+        with pytest.raises(fmpy.fmi1.FMICallException):
+            fmu.setTime(t)
     fmu.setTime(5.1)
     with pytest.raises(fmpy.fmi1.FMICallException):
         fmu.completedIntegratorStep()

@@ -226,6 +226,8 @@ FMI_API S FMI(EnterContinuousTimeMode)(I instance) { return UNUSED(instance), fm
 /* Time of the environment: no integration follows. */
 FMI_API S FMI(SetTime)(I instance, double t)
 {
+    if (!(t >= 0.0 && t <= LARGEST))
+        return fmi_failed(F, fmi_error, "the time is not one of the run");
     F->model->t = real_of(F->model)[R_t] = t;
     F->model->has_row = F->model->is_ahead = 0;
     return fmi_ok;
