@@ -104,6 +104,8 @@ static fmi_status fmi_get(fmu *f, const uint32_t *references, size_t count, doub
         if (references[k] >= VARIABLES)
             return fmi_failed(f, fmi_error, "there is no variable of such a reference");
         values[k] = dap3d_get(f->model, (int)references[k]);
+        if (isnan(values[k]))
+            return fmi_failed(f, fmi_discard, "a variable is not a number at this time and state");
     }
     return fmi_ok;
 }
