@@ -15,6 +15,7 @@ from dap3d_core.interface.errors import PluginError
 from dap3d_core.model import ModelError, build_model
 from dap3d_core.native.run.prepared import PreparedRun, refusal
 from dap3d_core.scene import SceneError
+from dap3d_core.scene.validate.bodies import SMALLEST_INERTIA
 from dap3d_core.scene.validate.coerce_values import LARGEST
 from dap3d_core.scene.validate.validate import check
 from dap3d_core.study.parameters import SceneParameter, with_values
@@ -92,9 +93,9 @@ def _limit(accepts: Callable[[float], bool], value: float, end: float) -> float:
         inside = 0.0
     sign = -1.0 if min(inside, outside) < 0.0 else 1.0
     # sizes by their places among all of double precision
-    a, b, one = np.abs([inside, outside, 1.0]).view(np.int64).tolist()
+    a, b, *usual = np.abs([inside, outside, 1.0, SMALLEST_INERTIA]).view(np.int64).tolist()
     step = 1 if b > a else -1
-    likely = [a + step, b - step, one, one + step]
+    likely = [a + step, b - step, *(place for x in usual for place in (x, x + step))]
     while abs(b - a) > 1:
         middle = likely.pop(0) if likely else (a + b) // 2
         if min(a, b) < middle < max(a, b):
