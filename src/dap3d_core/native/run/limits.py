@@ -48,7 +48,7 @@ OPEN = Limits()
 def limits_of(
     prepared: PreparedRun, parameters: Sequence[SceneParameter], *, allow_code: bool = False
 ) -> list[Limits]:
-    """Limits of parameters of a scene; none of several inertias of a body, checked at the start.
+    """Limits of parameters of a scene; none of inertias, checked at the start.
 
     Raises:
         SceneError: what is accepted of one parameter depends on another: their names.
@@ -66,20 +66,19 @@ def limits_of(
     def last(one: SceneParameter, end: float) -> float:
         return _limit(lambda x: are_accepted([one], [x]), float(one.value or 0.0), end)
 
-    limits = [Limits(last(one, -LARGEST), last(one, LARGEST)) for one in parameters]
-    found = list(limits)
+    limits = [
+        OPEN if one.path[-1] == "Jp" else Limits(last(one, -LARGEST), last(one, LARGEST))
+        for one in parameters
+    ]
     for (a, one), (b, other) in combinations(enumerate(parameters), 2):
         are_near = one.path[:2] == other.path[:2] or "parameters" in (one.table, other.table)
         if not are_near or OPEN in (limits[a], limits[b]):
-            continue
-        if one.path == other.path and one.path[-1] == "Jp":
-            found[a] = found[b] = OPEN
             continue
         ends = ((x for x, _, words in limits[k].ends if words) for k in (a, b))
         if not all(are_accepted([one, other], corner) for corner in product(*ends)):
             what = f"what {one.name} may be depends on {other.name}"
             raise refusal(what, "leave one of these parameters out")
-    return found
+    return limits
 
 
 def _limit(accepts: Callable[[float], bool], value: float, end: float) -> float:
