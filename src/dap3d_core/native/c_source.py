@@ -229,12 +229,12 @@ def _variables(variables: Sequence[Variable]) -> list[str]:
     for v in variables:
         place = first if v.kind in PARAMETERS else v.first
         first += len(v.words)
-        for text in (v.name, v.unit, *(words for _, words in v.limits.ends if words)):
+        for text in (v.name, v.unit, *(said for *_, said in v.limits.ends if said)):
             if text not in starts:
                 starts[text], size = size, size + len(text.encode()) + 1
         texts = f"{starts[v.name]}, {starts[v.unit]}"
         numbers = f"{place}, {len(v.words)}, {int(v.is_mean)}"
-        low, high = (f"{x!r}, {starts.get(words, 0)}" for x, words in v.limits.ends)
+        low, high = (f"{x!r}, {starts.get(said, 0)}" for x, _, said in v.limits.ends)
         places += [f"{{{word}, {sign:g}, {low}, {high}}}" for word, sign in v.words]
         rows.append(f"{{{texts}, DAP3D_{v.kind.upper()}, {numbers}}}")
     texts_of = [f'    {c_text(text)} "\\0"' for text in starts]

@@ -21,7 +21,7 @@ from dap3d_core.native.c_source import PARAMETERS, Variable, data_of, variables_
 from dap3d_core.native.fmu import write_fmu
 from dap3d_core.native.library import Exported
 from dap3d_core.native.run.directions import Directions
-from dap3d_core.native.run.limits import Limits, limits_of
+from dap3d_core.native.run.limits import limits_of
 from dap3d_core.native.run.outputs import Outputs, outputs_of
 from dap3d_core.native.run.parameters import places_of
 from dap3d_core.native.run.prepared import PreparedRun, refusal
@@ -174,11 +174,9 @@ def _parameters(
         parameters = parameters_named(prepared.compiled.checked, names)
     except SceneError as error:
         raise SceneError([attrs.evolve(m, key="parameters") for m in error.mistakes]) from None
+    found = [_parameter(prepared, parameter, options, outputs) for parameter in parameters]
     limits = limits_of(prepared, parameters, allow_code=bool(options.get("allow_code")))
-    return [
-        _parameter(prepared, parameter, within, options, outputs)
-        for parameter, within in zip(parameters, limits, strict=True)
-    ]
+    return [attrs.evolve(v, limits=x) for v, x in zip(found, limits, strict=True)]
 
 
 def _refuse_shared(variables: Sequence[Variable]) -> None:
@@ -201,11 +199,7 @@ def _refuse_shared(variables: Sequence[Variable]) -> None:
 
 
 def _parameter(
-    prepared: PreparedRun,
-    parameter: SceneParameter,
-    limits: Limits,
-    options: dict[str, Any],
-    outputs: Outputs,
+    prepared: PreparedRun, parameter: SceneParameter, options: dict[str, Any], outputs: Outputs
 ) -> Variable:
     """A parameter as a variable.
 
@@ -223,7 +217,6 @@ def _parameter(
     return Variable(
         name, kind, parameter.unit, f"parameter {name}", int(places.moves_start),
         float(parameter.value or 0.0), tuple(places.words.items()),
-        limits=limits,
     )  # fmt: skip
 
 
@@ -266,10 +259,8 @@ def variables_header(prepared: PreparedRun, variables: Sequence[Variable]) -> st
         while word in used:
             word += "_"
         used.add(word)
-        note = "; ".join(
-            (f"{v.kind}: {v.name} [{v.unit}]", *(words for _, words in v.limits.ends if words))
-        )
-        note = note.replace("*/", "* /")
+        words = [f"{v.kind}: {v.name} [{v.unit}]", *(said for *_, said in v.limits.ends if said)]
+        note = "; ".join(words).replace("*/", "* /")
         lines.append(f"    V_{word} = {k}, /* {note} */")
     return "\n".join([*lines, "};", ""])
 

@@ -153,8 +153,8 @@ def _variable(parent: Element, k: int, v: Variable, first: dict[str, int], fmi: 
     own = {} if v.unit in ("", "1", "SI") else {"unit": v.unit}
     if v.kind in ("input", "parameter", "fixed", "state"):
         own["start"] = repr(float(v.start))
-    for key, end in zip(("min", "max"), v.limits.closed, strict=True):
-        own |= {} if end is None else {key: repr(end)}
+    ends = zip(("min", "max"), v.limits.ends, strict=True)  # of an open one the number there
+    own |= {key: repr(at) for key, (_, at, _) in ends if at is not None}
     if v.kind == "derivative":
         own["derivative"] = str(first["state"] + v.first + (1 if fmi == 2 else 0))
     if fmi == 3:

@@ -53,9 +53,16 @@ def test_model_exchange_by_cvode_gives_the_motion(tmp_path, fmi):
 @VERSIONS
 def test_times_of_model_exchange_may_round_beyond_the_end(tmp_path, fmi):
     made = written(dap.load("pen1"), tmp_path, fmi=fmi, outputs=["cone.r"])
-    fmu, _ = begun(made, tmp_path, fmi, kind="ModelExchange")
+    fmu, at = begun(made, tmp_path, fmi, kind="ModelExchange")
     fmu.setTime(np.nextafter(5.0, 6.0))
     fmu.completedIntegratorStep()
+    for t in (np.nan, np.inf, -1.0):
+        with pytest.raises(fmpy.fmi1.FMICallException):
+            fmu.setTime(t)
+    fmu.setContinuousStates((ctypes.c_double * 14)(*[np.nan] * 14), 14)
+    for name in ("cone.r.x", "der(state.cone.r.x)"):  # what an integrator tries has no values
+        with pytest.raises(fmpy.fmi1.FMICallException):
+            (fmu.getReal if fmi == 2 else fmu.getFloat64)([at[name]])
     fmu.setTime(5.1)
     with pytest.raises(fmpy.fmi1.FMICallException):
         fmu.completedIntegratorStep()

@@ -15,6 +15,7 @@ from dap3d_core.interface.errors import PluginError
 from dap3d_core.model import ModelError, build_model
 from dap3d_core.native.run.prepared import PreparedRun, refusal
 from dap3d_core.scene import SceneError
+from dap3d_core.scene.validate.bodies import SMALLEST_INERTIA
 from dap3d_core.scene.validate.coerce_values import LARGEST
 from dap3d_core.scene.validate.validate import check
 from dap3d_core.study.parameters import SceneParameter, with_values
@@ -28,49 +29,26 @@ class Limits:
     high: float = LARGEST
 
     @property
-    def is_open(self) -> bool:
-        """True if every number is accepted."""
-        return self == OPEN
-
-    @property
-    def ends(self) -> tuple[tuple[float, str], tuple[float, str]]:
-        """Both, each with what is said of a number beyond it; "" of the largest numbers."""
-        low, high = self.closed
-        least = "greater than" if low != self.low else "at least"
-        most = "less than" if high != self.high else "at most"
-        return (
-            (self.low, "" if low is None else f"should be {least} {_text(low)}"),
-            (self.high, "" if high is None else f"should be {most} {_text(high)}"),
-        )
-
-    @property
-    def closed(self) -> tuple[float | None, float | None]:
-        """Both, or the round number next to them, which is not accepted; None for no limit."""
-        low, high = np.nextafter(self.low, -np.inf), np.nextafter(self.high, np.inf)
-        return (
-            None if self.low == -LARGEST else _rounder(self.low, float(low)),
-            None if self.high == LARGEST else _rounder(self.high, float(high)),
-        )
+    def ends(self) -> list[tuple[float, float | None, str]]:
+        """Of both: itself, the round number there (None, no limit), what is said beyond it."""
+        found: list[tuple[float, float | None, str]] = []
+        kinds = (self.low, -LARGEST, "at least", "greater than"), (
+            self.high, LARGEST, "at most", "less than")  # fmt: skip
+        for last, end, closed, open_ in kinds:
+            at = min(last, float(np.nextafter(last, end)), key=lambda x: len(repr(x)))
+            words = f"should be {closed if at == last else open_} {repr(at).removesuffix('.0')}"
+            found.append((last, None, "") if last == end else (last, at, words))
+        return found
 
 
 #: Those of a number of which nothing is asked.
 OPEN = Limits()
 
 
-def _text(number: float) -> str:
-    """A number in as few digits as it has."""
-    return f"{number:g}" if float(f"{number:g}") == number else repr(number)
-
-
-def _rounder(number: float, other: float) -> float:
-    """The one of two numbers that has fewer digits."""
-    return min(number, other, key=lambda x: len(repr(x)))
-
-
 def limits_of(
     prepared: PreparedRun, parameters: Sequence[SceneParameter], *, allow_code: bool = False
 ) -> list[Limits]:
-    """Limits of parameters of a scene; none of several inertias of a body, checked at the start.
+    """Limits of parameters of a scene; none of inertias, checked at the start.
 
     Raises:
         SceneError: what is accepted of one parameter depends on another: their names.
@@ -85,26 +63,22 @@ def limits_of(
             return False
         return True
 
-    found = []
-    for one in parameters:
-        value = float(one.value or 0.0)
-        found.append(Limits(*(
-            _limit(lambda x, one=one: are_accepted([one], [x]), value, end)  # type: ignore[misc]
-            for end in (-LARGEST, LARGEST)
-        )))  # fmt: skip
-    limits = list(found)
+    def last(one: SceneParameter, end: float) -> float:
+        return _limit(lambda x: are_accepted([one], [x]), float(one.value or 0.0), end)
+
+    limits = [
+        OPEN if one.path[-1] == "Jp" else Limits(last(one, -LARGEST), last(one, LARGEST))
+        for one in parameters
+    ]
     for (a, one), (b, other) in combinations(enumerate(parameters), 2):
         are_near = one.path[:2] == other.path[:2] or "parameters" in (one.table, other.table)
-        if not are_near or limits[a].is_open or limits[b].is_open:
+        if not are_near or OPEN in (limits[a], limits[b]):
             continue
-        if one.path == other.path and one.path[-1] == "Jp":
-            found[a] = found[b] = OPEN
-            continue
-        ends = ((x for x, words in limits[k].ends if words) for k in (a, b))
+        ends = ((x for x, _, words in limits[k].ends if words) for k in (a, b))
         if not all(are_accepted([one, other], corner) for corner in product(*ends)):
             what = f"what {one.name} may be depends on {other.name}"
             raise refusal(what, "leave one of these parameters out")
-    return found
+    return limits
 
 
 def _limit(accepts: Callable[[float], bool], value: float, end: float) -> float:
@@ -116,23 +90,14 @@ def _limit(accepts: Callable[[float], bool], value: float, end: float) -> float:
         return end
     elif value * end < 0.0:
         inside = 0.0
-    a, b, one, minus_one = map(_ordinal, (inside, outside, 1.0, -1.0))
+    sign = -1.0 if min(inside, outside) < 0.0 else 1.0
+    # sizes by their places among all of double precision
+    a, b, *usual = np.abs([inside, outside, 1.0, SMALLEST_INERTIA]).view(np.int64).tolist()
     step = 1 if b > a else -1
-    likely = [a + step, b - step, one, one + step, minus_one, minus_one + step]
+    likely = [a + step, b - step, *(place for x in usual for place in (x, x + step))]
     while abs(b - a) > 1:
         middle = likely.pop(0) if likely else (a + b) // 2
         if min(a, b) < middle < max(a, b):
-            a, b = (middle, b) if accepts(_number(middle)) else (a, middle)
-    return _number(a)
-
-
-def _ordinal(number: float) -> int:
-    """The place of a number among all of double precision; 0 of zero."""
-    bits = int(np.float64(abs(number)).view(np.int64))
-    return bits if number >= 0.0 else -bits
-
-
-def _number(ordinal: int) -> float:
-    """The number at a place."""
-    size = float(np.int64(abs(ordinal)).view(np.float64))
-    return size if ordinal >= 0 else -size
+            is_in = accepts(sign * float(np.int64(middle).view(np.float64)))
+            a, b = (middle, b) if is_in else (a, middle)
+    return sign * float(np.int64(a).view(np.float64)) + 0.0  # no zero has a sign

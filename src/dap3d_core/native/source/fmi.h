@@ -104,6 +104,8 @@ static fmi_status fmi_get(fmu *f, const uint32_t *references, size_t count, doub
         if (references[k] >= VARIABLES)
             return fmi_failed(f, fmi_error, "there is no variable of such a reference");
         values[k] = dap3d_get(f->model, (int)references[k]);
+        if (isnan(values[k]))
+            return fmi_failed(f, fmi_discard, "a variable is not a number at this time and state");
     }
     return fmi_ok;
 }
@@ -226,6 +228,8 @@ FMI_API S FMI(EnterContinuousTimeMode)(I instance) { return UNUSED(instance), fm
 /* Time of the environment: no integration follows. */
 FMI_API S FMI(SetTime)(I instance, double t)
 {
+    if (!(t >= 0.0 && t <= LARGEST))
+        return fmi_failed(F, fmi_error, "the time is not one of the run");
     F->model->t = real_of(F->model)[R_t] = t;
     F->model->has_row = F->model->is_ahead = 0;
     return fmi_ok;
