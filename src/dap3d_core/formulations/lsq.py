@@ -11,6 +11,8 @@ Weights that follow the length of their rows make the motion independent of how 
 Accelerations are unique, multipliers are not: reported are those of least |lambda|, what
 numpy.linalg.lstsq or pinv give. Where forces depend on multipliers accelerations are not unique
 either: such forces read those of least lambda . w lambda (decision 0074), which are then reported.
+In scenes that are not of ordinary size rows are first scaled to lengths (``System.weight``), as one
+weight e does not serve those of squares of millimetres and those of directions together.
 """
 
 from typing import Any
@@ -48,15 +50,17 @@ def minimum_norm_multipliers(system: System) -> None:
     takes away the rest: n, in ``right_side``, is then subtracted from ``total``. What D^T sees of
     n in the end, e times the ``change`` of the last pass, says whether e was small enough.
     """
-    total, n = system.total, system.right_side
+    total, n, weight = system.total, system.right_side, system.weight
     weigh_rows(system.blocks, system.D, 1.0, system.compliance)
-    longest = largest(system.compliance)
+    longest = size = 0.0
     for k in range(n.shape[0]):
+        longest = max(longest, system.compliance[k] * weight[k] * weight[k])
         if system.compliance[k] == 0.0:  # a hub's place, or a row that does nothing
             total[k] = 0.0
         n[k] = total[k]
+        size = max(size, abs(total[k]) / weight[k])
     e, seen = LEAST_PART * longest, np.inf
-    while seen > TAKEN * np.sqrt(longest) * largest(total) and e > SMALLEST * longest:
+    while seen > TAKEN * np.sqrt(longest) * size and e > SMALLEST * longest:
         seen = null_space_component(system, n, e)
         e *= SMALLER
     for k in range(n.shape[0]):
@@ -66,14 +70,15 @@ def minimum_norm_multipliers(system: System) -> None:
 @compiled
 def null_space_component(system: System, n: Floats, e: float) -> float:
     """Take from n what D^T sees, as far as a weight e does; the largest seen of the rest."""
-    x, before = system.multipliers, np.inf
+    x, weight, before = system.multipliers, system.weight, np.inf
     for k in range(x.shape[0]):
-        system.compliance[k] = e
-        x[k] = n[k]
+        system.compliance[k] = e / (weight[k] * weight[k])
     assemble(system.targets, system.contributions, system.D, system.K)
     regularise(system.nodes, system.compliance, system.K)
     factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
     for _ in range(LEAST_SOLVES):
+        for k in range(x.shape[0]):
+            x[k] = n[k] / (weight[k] * weight[k])
         zero(system.change)
         solve_rows(system, system.change)
         change = 0.0
@@ -82,7 +87,7 @@ def null_space_component(system: System, n: Floats, e: float) -> float:
                 x[c] = 0.0
         for k in range(x.shape[0]):
             x[k] *= -e
-            change = max(change, abs(x[k] - n[k]))
+            change = max(change, abs(x[k] - n[k]) / weight[k])
             n[k] = x[k]
         if not change < 0.5 * before:
             break

@@ -176,6 +176,25 @@ def test_the_motion_does_not_depend_on_the_size_of_rows(size):
     assert sized.rdd[0] == pytest.approx(plain.rdd[0], abs=1e-12)
 
 
+@pytest.mark.parametrize("method", ["lsq", "joint", "standard"])
+@pytest.mark.parametrize("size", [1.0, 1e-3, 1e-5, 1e4])
+def test_rows_of_squares_beside_those_of_directions(size, method):
+    """A mass of one kg circles at 1 rad/s on a massless rod, beside a hinge: its pull is m r w^2.
+
+    A row of a squared length is as short as the rod, one of a direction is of length one.
+    """
+    scene = dap.Scene(name="small")
+    scene.add_body("b", mass=1.0, Jp=(size**2,) * 3, r=(size, 0.0, 0.0), r_dot=(0.0, size, 0.0))
+    scene.add_vector2("d", "b.O", "ground.O")
+    scene.add_joint("sph-sph", "rod", d="d")
+    scene.add_body("c", mass=1.0, Jp=(size**2,) * 3, r=(0.0, size, 0.0), w=(0.0, 0.0, 1.0))
+    scene.add_point("C", "ground", (0.0, size, 0.0))
+    scene.add_joint("rev", "hinge", P_i="c.O", P_j="C", a_i="c.z", a_j="ground.z")
+    scene.simulation.method = method
+    pull = dap.simulate(scene, t_end=0.0).quantity("rod.force").values[0]
+    np.testing.assert_allclose(np.abs(pull) / size, [1.0, 0.0, 0.0], rtol=0.0, atol=1e-9)
+
+
 def test_auto_takes_lsq_where_rows_are_redundant():
     """Already compiled for it, with the reason; the run says which joints, and goes."""
     compiled = dap.compile(mechanisms.door(0.02))
