@@ -51,7 +51,8 @@ def test_more_inputs(name):
                                     26_078_414, 27_019_585, 25_987_196, 21_456_175,
                                     8_003_505, 17_694_781, 3_738_232,
                                     6_188_153, 4_609_733, 27_250_592, 9_754_102,
-                                    4_607_735, 25_774_717, 3_059_079, 342_429])  # fmt: skip
+                                    4_607_735, 25_774_717, 3_059_079, 342_429,
+                                    14_803_168])  # fmt: skip
 def test_contacts_that_once_ended_falsely(number):
     """As "ever faster", by steps as short as rounding, with a force that pulls, or overlapping.
 

@@ -21,7 +21,7 @@ from dap3d_core.formulations.contacts.contact_table import (
     find_grips,
     put_outputs,
 )
-from dap3d_core.formulations.contacts.forces import put_slip_against, size_across
+from dap3d_core.formulations.contacts.forces import put_slip_against, size_across, still_speed
 from dap3d_core.formulations.contacts.impacts import (
     AT_REST,
     collide,
@@ -99,6 +99,8 @@ def decide(
     if not collide(s, system):
         blame(s)
         return WEDGED
+    if s.round_count > 0:
+        stop_what_rests(s, system)
     move_on(t, s, system, loops)
     find_grips(t, s, system, tensions)
     if s.jammed >= 0:
@@ -237,7 +239,7 @@ def stop(s: ContactArrays, system: System) -> None:
 
     At a dead centre it passes through zero while the mechanism moves on.
     """
-    own, count, found = s.lam_free.shape[0], 0, False
+    own, count = s.lam_free.shape[0], 0
     for c in range(s.state.shape[0]):
         is_stopped = False
         if s.stops[c] != 0:
@@ -253,8 +255,33 @@ def stop(s: ContactArrays, system: System) -> None:
                 across = is_stopped and (i > 0 or s.gapless[c] > 0.0)
                 s.rows[count] = 3 * c + i
                 s.right[count] = -s.slip[c, i] if across else 0.0
-                found |= s.right[count] != 0.0
                 count += 1
+    change_rates(s, count, system)
+
+
+@compiled
+def stop_what_rests(s: ContactArrays, system: System) -> None:
+    """Stop what rounds of impacts leave of the rates of what touches: slip as slow as at rest, too.
+
+    Forces are found as if it were zero: with directions of that slip they would differ.
+    """
+    count = 0
+    for k in range(s.in_touch_count):
+        c = s.in_touch[k]
+        slips = size_across(s, c, s.slip[c]) > still_speed(s, c)
+        for i in range(3 if abs(s.closing[c]) <= AT_REST * s.length[c] else 0):
+            if not slips or (i == 0 and s.gapless[c] == 0.0):
+                s.rows[count], s.right[count] = 3 * c + i, -s.slip[c, i]
+                count += 1
+    change_rates(s, count, system)
+
+
+@compiled
+def change_rates(s: ContactArrays, count: int, system: System) -> None:
+    """Change the rates of so many ``rows`` by what is ``right``, with the joints held."""
+    found = False
+    for i in range(count):
+        found |= s.right[i] != 0.0
     if not found:
         return
     for i in range(count):
