@@ -395,12 +395,8 @@ def test_feet_that_slide_fast_lift_and_land_without_endless_steps():
     assert result.ledger["energy"].value < 1e-10
 
 
-@pytest.mark.parametrize("method", ["lsq", "joint"])
-def test_a_gripper_lifts_what_it_holds_and_what_stands(method):
-    """Joints hold what the grips would, until the hoist begins to move: the box leaves the floor.
-
-    With the fingers at rest the friction of the grips is a choice, beside that of the floor.
-    """
+def gripper(pads):
+    """A box on the floor, two fingers with pads at (y, z), on a hoist that moves from 0.3 s."""
     scene = dap.Scene(name="gripper")
     scene.add_body("box", mass=0.5, Jp=[1e-3] * 3, r=[0.0, 0.0, 0.05])
     scene.add_body("palm", mass=2.0, Jp=[0.01] * 3, r=[0.0, 0.0, 0.3])
@@ -411,19 +407,43 @@ def test_a_gripper_lifts_what_it_holds_and_what_stands(method):
     for name, side in (("left", -1.0), ("right", 1.0)):
         scene.add_body(name, mass=0.2, Jp=[1e-4] * 3, r=[side * 0.08, 0.0, 0.05])
         scene.add_point(f"{name}_rail", name, [0.0, 0.0, 0.25])
-        scene.add_point(f"{name}_tip", name, [-side * 0.02, 0.0, 0.0])
         scene.add_joint("tran", f"{name}_slide", P_i=f"{name}_rail", P_j="palm.O", a_j="palm.x")
         scene.add_force("tran_sda", joint=f"{name}_slide", f_a=-side * 10.0, c=5.0)
-        grip = {"P_i": f"{name}_tip", "radius": 0.01, "P_j": "box.O", "size": [0.1] * 3}
-        scene.add_contact("ball_box", f"{name}_grip", **grip, mu=0.8)
+        for k, place in enumerate(pads):
+            scene.add_point(f"{name}_tip{k}", name, [-side * 0.02, *place])
+            grip = {"P_i": f"{name}_tip{k}", "radius": 0.01, "P_j": "box.O", "size": [0.1] * 3}
+            scene.add_contact("ball_box", f"{name}_grip{k}", **grip, mu=0.8)
     scene.add_force("weight", "g")
-    result = dap.simulate(scene, t_end=1.0, dt=0.05, method=method)
+    return scene
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "adams"])
+def test_a_gripper_of_three_pads_a_finger_lifts_what_stands(integrator):
+    """None slips, and together they carry; how left and right share that is a choice."""
+    scene = gripper([(-0.02, -0.02), (0.02, -0.02), (0.0, 0.03)])
+    result = dap.simulate(scene, t_end=1.0, dt=0.05, integrator=integrator)
+    u = np.clip(result.t - 0.3, 0.0, 1.0)
+    assert abs(result.r[:, 0, 2] - 0.05 - 0.2 * (3.0 * u**2 - 2.0 * u**3)).max() < TOLERANCE
+    grips = [result.contact(f"{side}_grip{k}") for side in ("left", "right") for k in range(3)]
+    carried = sum(grip.friction[7:, 2] for grip in grips)
+    assert abs(carried + 0.5 * (G + 0.2 * (6.0 - 12.0 * u[7:]))).max() < TOLERANCE
+    assert max(abs(grip.slip).max() for grip in grips) < TOLERANCE
+    assert {event.kind for event in result.events} == {"touch", "lift"}
+
+
+@pytest.mark.parametrize("method", ["lsq", "joint"])
+def test_a_gripper_lifts_what_it_holds_and_what_stands(method):
+    """Joints hold what the grips would, until the hoist begins to move: the box leaves the floor.
+
+    With the fingers at rest the friction of the grips is a choice, beside that of the floor.
+    """
+    result = dap.simulate(gripper([(0.0, 0.0)]), t_end=1.0, dt=0.05, method=method)
     u = np.clip(result.t - 0.3, 0.0, 1.0)
     rise = 0.2 * (3.0 * u**2 - 2.0 * u**3)
     assert abs(result.r[:, 0, 2] - 0.05 - rise).max() < TOLERANCE
     assert [e.t for e in result.events if e.kind == "lift"] == pytest.approx([0.3] * 4, abs=1e-8)
     assert not times(result, "slip")
-    carried = result.contact("left_grip")
+    carried = result.contact("left_grip0")
     held = 0.25 * (G + 0.2 * (6.0 - 12.0 * u))
     assert abs(carried.friction[7:, 2] + held[7:]).max() < TOLERANCE
     assert (carried.mode == 2).all()

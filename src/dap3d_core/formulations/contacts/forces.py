@@ -18,6 +18,8 @@ STILL, ZERO = 1e-9, 1e-9
 BESIDE = 1e-3
 #: What is left of a cone problem that has no solution.
 UNSOLVED = 1e-6
+#: A load that bounds nothing.
+BOUNDLESS = 1e100
 
 
 @compiled
@@ -148,12 +150,13 @@ def put_rates(s: ContactArrays) -> None:
 
 
 @compiled
-def solve_forces(s: ContactArrays, part: float) -> bool:
+def solve_forces(s: ContactArrays, part: float, sticks: bool) -> bool:
     """Forces of closed contacts into ``cone.x``, which is where it begins, and ``rates``.
 
     False where there are none.
 
     part: of the cones; contacts that are ``slipping`` have mu, not mu_s.
+    sticks: friction of what presses holds, however large.
     """
     cone = s.cone
     cone.count = s.closed_count
@@ -164,7 +167,8 @@ def solve_forces(s: ContactArrays, part: float) -> bool:
         c = s.closed[k]
         mu = s.mu[c] if s.slipping[c] != 0 else s.mu_s[c]
         cone.mu[k] = 0.0 if s.slides[c] != 0 else part * mu
-        cone.more[k], cone.gapless[k], cone.ratio[k] = s.load[c], s.gapless[c], s.ratio_s[c]
+        cone.more[k] = BOUNDLESS if sticks and s.alone[c] == 0 else s.load[c]
+        cone.gapless[k], cone.ratio[k] = s.gapless[c], s.ratio_s[c]
     if solve_cone(cone, TRIES) > UNSOLVED:
         for k in range(s.closed_count):
             s.jams[s.closed[k]] = 1
@@ -230,7 +234,7 @@ def begin_to_move(s: ContactArrays, part: float) -> bool:
     while True:
         for k in range(3 * s.closed_count):
             s.cone.x[k] = 0.0
-        if not solve_forces(s, part):
+        if not solve_forces(s, part, False):
             return False
         put_sizes(s, False)
         more = False

@@ -10,12 +10,13 @@ from dap3d_core.formulations.contacts.forces import (
     put_across,
     put_matrix,
     put_plain,
+    put_sizes,
     put_slip_against,
     size_across,
     solve_forces,
     still_speed,
 )
-from dap3d_core.formulations.contacts.sharing import do_share, hold_inside, leave_to_others
+from dap3d_core.formulations.contacts.sharing import are_inside, do_share, leave_to_others
 from dap3d_core.kernels.array_types import Integers
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -119,7 +120,7 @@ def put_modes(s: ContactArrays) -> bool:
         # of contacts that share, one at the end of its cone may only have to carry less
         if not put_matrix(s, False):
             return False
-        if do_share(s) and hold_inside(s) and all_stay(s):
+        if do_share(s) and hold_inside(s, False) and all_stay(s):
             leave_few(s)
             return put_found(s, False, True, False)
         put_plain(s)
@@ -128,6 +129,52 @@ def put_modes(s: ContactArrays) -> bool:
             return put_found(s, False, False, True)
         let_leave(s, leaves)
     return put_found(s, True, False, False)
+
+
+@compiled
+def hold_inside(s: ContactArrays, begins: bool) -> bool:
+    """Forces ``inner`` well within the cones of closed contacts that share, and hold, if any.
+
+    Where others open, those that hold without them are closed then: of several solutions that in
+    which nothing begins to slip.
+    begins: as of ``put_matrix``.
+    """
+    holds, before, count = are_inside(s), s.closed_count, 0
+    for k in range(before):
+        s.active[k], s.gone[s.closed[k]] = s.closed[k], 0
+    while not holds and count != s.closed_count:
+        count = s.closed_count
+        let_open(s)
+        if 0 < s.closed_count < count and put_matrix(s, begins) and are_inside(s):
+            holds = put_returning(s, -ZERO * put_sizes(s, True)) == 0
+    if not holds and s.closed_count < before:
+        for k in range(before):
+            s.closed[k] = s.active[k]
+        s.closed_count = before
+        put_matrix(s, begins)
+    return holds
+
+
+@compiled
+def let_open(s: ContactArrays) -> None:
+    """Take from closed contacts those that open where friction of all others holds."""
+    before = s.closed_count
+    for k in range(before):
+        s.slipping[s.closed[k]] = 0
+        for i in range(3):
+            s.cone.x[3 * k + i] = 0.0
+    is_solved = solve_forces(s, 1.0, True)
+    put_sizes(s, True)
+    s.closed_count = 0
+    for k in range(before):
+        c, force = s.closed[k], s.cone.A[3 * k, 3 * k] * s.cone.x[3 * k]
+        s.jams[c] = 0
+        opens = is_solved and s.alone[c] == 0 and s.rates[3 * k] > max(ZERO * s.sizes[k], force)
+        if opens or not is_pressed(s, c, s.closed, s.closed_count):
+            s.gone[c] = 1
+        else:
+            s.closed[s.closed_count] = c
+            s.closed_count += 1
 
 
 @compiled
@@ -154,13 +201,13 @@ def leave_few(s: ContactArrays) -> None:
         if s.begins[c] == 0 or s.alone[c] != 0 or s.inner[3 * k] > TO_STICK * largest:
             s.closed[s.closed_count] = c
             s.closed_count += 1
-    if s.closed_count == before or (put_matrix(s, False) and hold_inside(s)):
+    if s.closed_count == before or (put_matrix(s, False) and hold_inside(s, False)):
         return
     for k in range(before):
         s.closed[k] = s.before[k]
     s.closed_count = before
     put_matrix(s, False)
-    hold_inside(s)
+    hold_inside(s, False)
 
 
 @compiled
@@ -193,7 +240,7 @@ def let_leave(s: ContactArrays, count: int) -> None:
         without = s.closed_count
         for k in range(3 * without):
             s.cone.x[k] = 0.0
-        holds = put_matrix(s, True) and solve_forces(s, 1.0)
+        holds = put_matrix(s, True) and solve_forces(s, 1.0, False)
         if not holds or put_returning(s, -ZERO * big) > 0:
             if not holds or without > 0:
                 for k in range(before):
@@ -243,7 +290,7 @@ def put_found(s: ContactArrays, begins: bool, inner: bool, loose: bool) -> bool:
     if not put_matrix(s, begins):
         return False
     shares = do_share(s)
-    holds = inner or (shares and not loose and hold_inside(s))
+    holds = inner or (shares and not loose and hold_inside(s, begins))
     if not holds and not begin_to_move(s, LOOSE if loose else 1.0):
         return False
     if loose:
@@ -280,9 +327,9 @@ def hold_beside_slip(s: ContactArrays) -> bool:
         if s.begins[c] != 0:
             put_slip_against(s, c, force, s.begin_way[c])
             found = True
-    holds = found and put_matrix(s, True) and hold_inside(s)
-    for k in range(s.closed_count):
-        s.begins[s.closed[k]] = s.along_with[s.closed[k]]
+    holds = found and put_matrix(s, True) and hold_inside(s, True)
+    for k in range(s.group_count):
+        s.begins[s.group[k]] = s.along_with[s.group[k]]
     return holds
 
 

@@ -18,7 +18,13 @@ import math
 import numpy as np
 
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
-from dap3d_core.formulations.contacts.forces import largest_entry, put_open, put_rates, put_sizes
+from dap3d_core.formulations.contacts.forces import (
+    BOUNDLESS,
+    largest_entry,
+    put_open,
+    put_rates,
+    put_sizes,
+)
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.least_squares import factor_least, put_null, solve_least
 
@@ -34,8 +40,6 @@ LEAST_RIM = 1e-11
 #: Of Newton's method passes at most, the decrement at which it is near, and how much more t weighs
 #: each time that it is.
 PASSES, NEAR, HEAVIER = 50, 0.25, 10.0
-#: A load that bounds nothing.
-BOUNDLESS = 1e100
 #: Part of a diagonal that is rounding of a pivot.
 PIVOT = 1e-16
 
@@ -79,7 +83,7 @@ def put_own_rows(s: ContactArrays) -> int:
 
 
 @compiled
-def hold_inside(s: ContactArrays) -> bool:
+def are_inside(s: ContactArrays) -> bool:
     """Forces ``inner`` well within the cones of closed contacts that share, and hold, if any."""
     resists = False
     for k in range(s.closed_count):

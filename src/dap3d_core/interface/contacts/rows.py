@@ -59,12 +59,12 @@ def before_straying(rest, slip, way):
     """The rest of a cone, negative also where slip grows along rows that others hold no longer.
 
     A driver that begins to move is among these. Slip is still that of rest then, and what contacts
-    do is found anew.
+    do is found anew. At rest it is the rest itself, whose slope shows an end within a step.
     """
     x, y, z = (where(a > 0.0, u, 0.0) for a, u in zip(way, slip, strict=True))
     square = STRAYED**2 * dot(way, way)
     left = 1.0 - (x * x + y * y + z * z) / where(square > 0.0, square, 1.0)
-    return where((square > 0.0) & (left < rest), left, rest)
+    return where(rest > 0.0, left, 1.0) * rest
 
 
 def tangents(n, grain=None):

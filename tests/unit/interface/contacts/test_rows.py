@@ -3,6 +3,7 @@
 import pytest
 
 import dap3d_core as dap
+from dap3d_core.interface.contacts.rows import STRAYED, before_straying
 
 
 def lift(mass):
@@ -25,6 +26,14 @@ def test_a_heavy_ball_lifts_off_in_no_more_steps_than_a_light_one():
     assert heavy.events[-1].kind == "lift"
     assert abs(heavy.events[-1].t - light.events[-1].t) < 1e-12
     assert heavy.stats.steps <= light.stats.steps + 1
+
+
+@pytest.mark.parametrize("rest", [5.0, 0.5, -2.0])
+def test_at_rest_the_rest_of_a_cone_is_itself_and_slip_of_rows_that_do_not_hold_ends_it(rest):
+    still, fast, way = (0.0, 0.0, 0.0), (0.0, 1.1 * STRAYED, 0.0), (0.0, 1.0, 0.0)
+    assert before_straying(rest, still, way) == rest
+    assert before_straying(rest, fast, way) < 0.0
+    assert before_straying(rest, fast, still) == rest
 
 
 @pytest.mark.parametrize(("mass", "beside"), [(1e-9, 1e-9), (1e-6, 10.0)])
