@@ -124,8 +124,7 @@ def solve_cone(c: Cone, tries: int) -> float:
 def stretch(c: Cone) -> float:
     """Stretch what friction in ellipses acts along until these are circles; the scale of x.
 
-    What a row of rounding changes of itself says nothing of that, but what its contact does, and of
-    friction without a normal its limit.
+    What a row of rounding changes of itself says nothing of that, but what its contact does.
     """
     scale = 0.0
     for i in range(3 * c.count):
@@ -136,10 +135,9 @@ def stretch(c: Cone) -> float:
     for k in range(c.count):
         c.r[k] = 1.0 / max(c.K[3 * k, 3 * k], c.K[3 * k + 1, 3 * k + 1],
                            c.K[3 * k + 2, 3 * k + 2], TINY)  # fmt: skip
-        has_normal = (c.gapless[k] == 0.0) & (c.K[3 * k, 3 * k] != 0.0)
-        most = np.inf if has_normal else c.mu[k] * c.more[k]
         for i in range(3 * k, 3 * k + 3):
-            scale = max(scale, min(abs(c.q[i]) * c.r[k], most))
+            own = c.r[k] if c.gapless[k] == 0.0 else 1.0 / max(c.K[i, i], TINY)
+            scale = max(scale, abs(c.q[i]) * own)
     return scale + TINY
 
 
