@@ -93,24 +93,20 @@ def cone_of(m: int) -> Cone:
 
 
 @compiled
-def solve_cone(c: Cone, tries: int) -> float:
-    """Solve for ``x``, from what stands there; the residual over its size, infinite of none.
-
-    tries: at most; fewer than TRIES where it is to be known whether there is a solution nearby, and
-        then nothing else is tried.
-    """
+def solve_cone(c: Cone) -> float:
+    """Solve for ``x``, from what stands there; the residual over its size, infinite of none."""
     n = 3 * c.count
     if n == 0:
         return 0.0
     scale = max(stretch(c), largest_noise(c) / SOLVED)
     z, left, sweeps = c.z[:n], 0.0, FIRST
-    for k in range(tries):
+    for k in range(TRIES):
         sweep(c, c.K, c.q, z, sweeps)
         sweeps = 4 * sweeps if k > 0 else SWEEPS
         left = newton(c, c.K, c.q, z, scale)
         if left <= SOLVED * scale:
             break
-    if tries == TRIES and not left <= SOLVED * scale:
+    if not left <= SOLVED * scale:
         left = come_nearer(c, left, scale)
     largest = 0.0
     for k in range(n):
@@ -124,7 +120,8 @@ def solve_cone(c: Cone, tries: int) -> float:
 def stretch(c: Cone) -> float:
     """Stretch what friction in ellipses acts along until these are circles; the scale of x.
 
-    What a row of rounding changes of itself says nothing of that, but what its contact does.
+    What a row of rounding changes of itself says nothing of that, but what its contact does; of
+    friction in three directions a row may be weak, and ask for more force than the others.
     """
     scale = 0.0
     for i in range(3 * c.count):

@@ -5,7 +5,7 @@
 
 import math
 
-from dap3d_core.formulations.contacts.cone import TRIES, solve_cone
+from dap3d_core.formulations.contacts.cone import solve_cone
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
@@ -169,7 +169,7 @@ def solve_forces(s: ContactArrays, part: float, sticks: bool) -> bool:
         cone.mu[k] = 0.0 if s.slides[c] != 0 else part * mu
         cone.more[k] = BOUNDLESS if sticks and s.alone[c] == 0 else s.load[c]
         cone.gapless[k], cone.ratio[k] = s.gapless[c], s.ratio_s[c]
-    if solve_cone(cone, TRIES) > UNSOLVED:
+    if solve_cone(cone) > UNSOLVED:
         for k in range(s.closed_count):
             s.jams[s.closed[k]] = 1
         return False

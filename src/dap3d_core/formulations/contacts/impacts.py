@@ -11,7 +11,7 @@ touch, as through Newton's cradle. Where e is zero everywhere one round of all t
 # mypy: disable-error-code="no-any-return"
 
 from dap3d_core.assembly.arrays import System
-from dap3d_core.formulations.contacts.cone import TRIES, solve_cone
+from dap3d_core.formulations.contacts.cone import solve_cone
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.contacts.forces import UNSOLVED, put_plain
 from dap3d_core.formulations.contacts.rows import change, kick, lift
@@ -68,7 +68,7 @@ def put_impulses(s: ContactArrays, e: Floats) -> bool:
         c = s.closed[k]
         if s.newton[c] != 0:
             cone.b[3 * k] += e[c] * min(s.slip[c, 0], 0.0)
-    left = solve_cone(cone, TRIES)
+    left = solve_cone(cone)
     for k in range(n):
         s.x[k] = cone.x[k]
     for k in range(s.closed_count):
@@ -83,7 +83,7 @@ def put_impulses(s: ContactArrays, e: Floats) -> bool:
         cone.x[i], cone.b[i] = 0.0, s.slip[s.closed[i // 3], i % 3]
         for k in range(n):
             cone.b[i] += cone.A[i, k] * s.x[k]
-    left = max(left, solve_cone(cone, TRIES))
+    left = max(left, solve_cone(cone))
     for k in range(n):
         s.x[k] += cone.x[k]
     return left <= UNSOLVED
@@ -101,7 +101,7 @@ def stop_slip(s: ContactArrays) -> bool:
             s.B[i, k] = 0.0 if resists or cone.under[k // 3] != k // 3 else cone.A[i, k]
     rank = factor_least(s.B, n, n, DEPENDENT, 0.0, s.w, s.order)
     solve_least(s.B, n, n, rank, s.w, s.order, s.x, cone.x)
-    left = solve_cone(cone, TRIES)
+    left = solve_cone(cone)
     for k in range(n):
         s.x[k] = cone.x[k]
     for k in range(s.closed_count):
