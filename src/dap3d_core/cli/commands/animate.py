@@ -8,7 +8,7 @@ import click
 
 from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
-from dap3d_core.cli.process.exit_codes import DONE, INTERRUPTED, Refused, refusing
+from dap3d_core.cli.process.exit_codes import DONE, Refused, refusing
 
 
 @command(
@@ -47,7 +47,7 @@ def animate(
 
     Ctrl-C leaves no file behind.
     """
-    from dap3d_core.cli.console.console import count, show_written, stderr
+    from dap3d_core.cli.console.console import count, show_written
     from dap3d_core.cli.console.progress import counting
     from dap3d_core.cli.framework.paths import open_result, output_path, writable
     from dap3d_core.plot import animate as draw
@@ -59,12 +59,8 @@ def animate(
     if size is not None:
         options["size"] = _size(size)
     writable(target, force=force, sources=(Path(result),))
-    try:
-        with counting("frame") as progress, refusing(ValueError, ResultError):
-            film = draw(opened, target, progress=progress, fit=fit, force=force, **options)
-    except KeyboardInterrupt:
-        stderr().say(f"interrupted; {target} was not written", "bold red")
-        return INTERRUPTED
+    with counting("frame") as progress, refusing(ValueError, ResultError):
+        film = draw(opened, target, progress=progress, fit=fit, force=force, **options)
     width, height = film.size
     contents = f"{width} x {height}, {count(film.frames, 'frame')}"
     if film.frames > 1:

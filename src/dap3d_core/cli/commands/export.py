@@ -10,7 +10,7 @@ import click
 
 from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
-from dap3d_core.cli.process.exit_codes import DONE, INTERRUPTED, Refused, refusing
+from dap3d_core.cli.process.exit_codes import DONE, Refused, refusing
 from dap3d_core.cli.process.streams import prints_json
 
 #: Options of the formats c and fmu alone, by parameter.
@@ -113,7 +113,7 @@ def _export_result(
 ) -> int:  # fmt: skip
     """Write a result by an exporter of a plugin."""
     from dap3d_core import export as write
-    from dap3d_core.cli.console.console import count, show_written, stderr
+    from dap3d_core.cli.console.console import count, show_written
     from dap3d_core.cli.console.progress import counting
     from dap3d_core.cli.framework.paths import open_result, output_path, refuse_all, writable
     from dap3d_core.exchange import check_fps, exporter_of, suffix_of
@@ -134,13 +134,9 @@ def _export_result(
             any_name=True,
         ),
     )
-    try:
-        with counting("part") as progress, refusing(ValueError, ResultError):
-            made = write(opened, target, format=kind, fps=fps, model=model, progress=progress,
-                         force=force)  # fmt: skip
-    except KeyboardInterrupt:
-        stderr().say(f"interrupted; {target} was not written", "bold red")
-        return INTERRUPTED
+    with counting("part") as progress, refusing(ValueError, ResultError):
+        made = write(opened, target, format=kind, fps=fps, model=model, progress=progress,
+                     force=force)  # fmt: skip
     data = {"format": made.format, "instants": made.instants}
     show_written(target, count(made.instants, "instant"), data, made.notes)
     return DONE

@@ -76,9 +76,9 @@ def _judge(error: BaseException) -> tuple[int, str]:
 
     if isinstance(error, KeyboardInterrupt):
         work = f" {error}" if str(error) else ""
-        return exit_codes.INTERRUPTED, f"interrupted{work}; nothing was computed yet"
+        return exit_codes.INTERRUPTED, f"interrupted{work}; nothing was written"
     if isinstance(error, exit_codes.Terminated):
-        return exit_codes.FAILED, f"{error}; nothing was computed yet"
+        return exit_codes.FAILED, f"{error}; nothing was written"
     if isinstance(error, (SceneError, PluginError, exit_codes.Refused)):
         return exit_codes.REFUSED, str(error)
     if is_lack:
