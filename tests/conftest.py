@@ -4,6 +4,7 @@ import gc
 import os
 import signal
 from collections import defaultdict
+from math import ceil
 from zlib import crc32
 
 import pytest
@@ -16,6 +17,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # A shell that puts a command into the background lets it ignore Ctrl-C, and so its children.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+#: Slow cases of one test that CI verifies, about; the others are long.
+MOST_CASES = 8
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -57,16 +61,21 @@ def keep_unoptimised():
     background.optimiser.add = lambda unit: None
 
 
+def _families(items):
+    """Cases of one test each, in order."""
+    found = defaultdict(list)
+    for item in items:
+        found[item.nodeid.partition("[")[0]].append(item)
+    return found.values()
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
     """Of the cases of a verification the quick tests take the first, of `every(n)` each n-th, of
-    any other test that has more than five each fifth. Of those that they leave CI verifies all, of
-    `thinned(n)` one of n, without order: each n-th would have the same value of some parameter."""
-    cases = defaultdict(list)
-    for item in items:
-        if not item.get_closest_marker("slow"):
-            cases[item.nodeid.partition("[")[0]].append(item)
-    for found in cases.values():
+    any other test that has more than five each fifth. Of those that they leave CI verifies some
+    `MOST_CASES`, without order: each n-th would have the same value of some parameter. Examples of
+    the documents are all run."""
+    for found in _families(i for i in items if not i.get_closest_marker("slow")):
         mark = found[0].get_closest_marker("every")
         if mark:
             n = mark.args[0]
@@ -77,10 +86,11 @@ def pytest_collection_modifyitems(items):
         for k, item in enumerate(found):
             if k % n:
                 item.add_marker("slow")
-    for item in items:
-        thinned, slow = map(item.get_closest_marker, ("thinned", "slow"))
-        if thinned and slow and crc32(item.nodeid.encode()) % thinned.args[0]:
-            item.add_marker("long")
+    for found in _families(i for i in items if i.get_closest_marker("slow")):
+        n = 1 if "/e2e/" in found[0].path.as_posix() else ceil(len(found) / MOST_CASES)
+        for item in found:
+            if crc32(item.nodeid.encode()) % n:
+                item.add_marker("long")
 
 
 def pytest_collection_finish():

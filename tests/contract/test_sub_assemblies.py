@@ -62,7 +62,6 @@ def evaluated(scene, u):
     return v_dot, switches, evaluator.state_rates(0.1, u) if len(evaluator.states) else []
 
 
-@pytest.mark.thinned(2)
 @pytest.mark.every(11)
 @pytest.mark.parametrize(
     ("kind", "case"), CASES, ids=[f"{k}-{n}" for k, c in CASES for n in case_names([c])]

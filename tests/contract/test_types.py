@@ -23,7 +23,6 @@ OWN = [key for key, distribution in INSTALLED.items() if distribution == "dap3d"
 JOINTS = cases(REGISTRY, "joint")
 
 
-@pytest.mark.thinned(2)
 @pytest.mark.parametrize("others", [False, pytest.param(True, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("key", OWN, ids="-".join)
 def test_type(key, others):

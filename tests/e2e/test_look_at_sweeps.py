@@ -153,6 +153,7 @@ def test_sliders_choose_the_motion(opened, swept):
     assert slider.get_attribute("aria-valuetext") == "-10 rad/s"
 
 
+@pytest.mark.long
 def test_what_was_switched_stays_switched(opened):
     opened.page.keyboard.press("1")
     opened.page.keyboard.press("t")
@@ -185,6 +186,7 @@ def test_a_point_that_failed_says_why(opened):
     assert opened.page.is_visible("#canvas")
 
 
+@pytest.mark.long
 def test_gravity_is_that_of_the_point(chromium, tmp_path):
     vary = {"forces.gravity.gravity": [9.81, 1.62, 0.0]}
     data = dap.sweep("pen1", vary, outputs="cone.r.z", **TIMES)
@@ -199,6 +201,7 @@ def test_gravity_is_that_of_the_point(chromium, tmp_path):
     assert found.complaints == []
 
 
+@pytest.mark.long
 def test_sliders_and_plots_have_room(chromium, page):
     """On a telephone."""
     size = (390, 844)
@@ -213,6 +216,7 @@ def test_sliders_and_plots_have_room(chromium, page):
     assert found.complaints == []
 
 
+@pytest.mark.long
 def test_samples_have_one_slider(chromium, tmp_path):
     data = dap.sweep(
         "pen1", {MASS: "3~0.2", WY: "-10:-4"}, outputs="cone.r.z:min", sample=60, **TIMES

@@ -47,7 +47,7 @@ def in_terminal(dap3d, width, *arguments, answers="", **variables):
     while time.monotonic() < end:
         ready, _, _ = select.select([main], [], [], 0.2)
         if not ready:
-            if waiting:
+            if waiting and shown:  # it has asked
                 os.write(main, waiting.pop(0))
             continue
         try:

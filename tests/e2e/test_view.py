@@ -143,6 +143,7 @@ def test_it_plays_pauses_and_steps_by_keys(opened, four):
     assert opened.run("dap3d.time") == four.t[-1]
 
 
+@pytest.mark.long
 def test_switches_change_the_picture_and_back(opened):
     opened.run("dap3d.seek(0.3)")
     opened.drawn()
@@ -165,6 +166,7 @@ def test_switches_change_the_picture_and_back(opened):
     assert "play, pause" in opened.page.inner_text("#help")
 
 
+@pytest.mark.long
 def test_the_camera_follows_a_body(opened):
     opened.page.keyboard.press("f")
     places = []
@@ -201,6 +203,7 @@ def test_the_mouse_orbits_and_zooms_and_r_brings_back(opened):
     np.testing.assert_allclose(seen(), first, atol=0.5)
 
 
+@pytest.mark.long
 def test_the_speed_says_how_fast_time_goes(opened):
     """Time moves on by what has passed on the clock, up to a quarter of a second a picture."""
     opened.page.select_option("#speed", "0.01")
@@ -256,7 +259,12 @@ def test_the_whole_motion_is_in_the_frame(chromium, four_page, four, size, theme
     assert page.complaints == []
 
 
-@pytest.mark.parametrize("model", ["tri", "A05", "ball1"])
+LONG = pytest.mark.long
+
+
+@pytest.mark.parametrize(
+    "model", ["tri", pytest.param("A05", marks=LONG), pytest.param("ball1", marks=LONG)]
+)
 def test_shipped_models_are_shown_without_complaint(chromium, tmp_path, model):
     result = dap.simulate(model, t_end=0.2, dt=0.02, allow_code=True)
     page = Opened(chromium, dap.view(result).save(tmp_path / "page.html"))
@@ -272,6 +280,7 @@ def test_ten_seconds_of_five_bodies_are_under_three_megabytes(tmp_path):
     assert dap.view(result).save(tmp_path / "page.html").stat().st_size < 3e6
 
 
+@pytest.mark.long
 def test_two_hundred_bodies_are_drawn_by_few_calls(chromium, tmp_path):
     """Bodies of one shape are one call of the graphics card."""
     result = dap.simulate(chain(200), t_end=0.02, dt=0.01, rtol=1e-5, atol=1e-6)
@@ -293,6 +302,7 @@ def test_a_notebook_shows_the_page_in_a_frame(chromium, four, tmp_path):
     context.close()
 
 
+@pytest.mark.long
 def test_a_single_instant_is_shown(chromium, tmp_path):
     result = dap.simulate("fourbar3", t_end=0.0)
     page = Opened(chromium, dap.view(result).save(tmp_path / "page.html"))
@@ -318,6 +328,7 @@ def test_without_webgl_plots_and_tables_still_work(chromium, four_page):
     context.close()
 
 
+@pytest.mark.long
 def test_a_page_plays_as_it_opens(chromium, four, tmp_path):
     """Where that is wished, and the system of its reader does not ask for less motion."""
     page = dap.view(four, play=True).save(tmp_path / "moving.html")
@@ -367,6 +378,7 @@ def curve_of(chromium, tmp_path, nt):
     return drawn["kept"][grid:], drawn["words"]
 
 
+@pytest.mark.long
 def test_a_dense_curve_is_drawn_in_the_order_of_time(chromium, tmp_path):
     """A fall goes down alone: of some thousand instants no column goes up first."""
     pieces, words = curve_of(chromium, tmp_path, 4001)
@@ -388,6 +400,7 @@ def test_a_coarse_curve_is_smooth_between_its_instants(chromium, tmp_path):
         assert second == pytest.approx(y[k + 1] - slopes[1] / 3.0, abs=1e-3)
 
 
+@pytest.mark.long
 def test_a_curve_without_a_known_slope_keeps_its_shape(chromium, tmp_path):
     """Slopes are those of the figures, by SciPy; an interval with a cut is straight."""
     from scipy.interpolate import PchipInterpolator

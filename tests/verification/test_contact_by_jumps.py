@@ -71,7 +71,6 @@ def ball(type_, z=LEVEL + HEIGHT, v=ZERO, gravity=G, x=0.0, **fields):
     return dap.compile(scene, registry=registry_of(type_))
 
 
-@pytest.mark.thinned(2)
 @pytest.mark.parametrize("e", [0.0, 0.3, 0.7])
 @pytest.mark.parametrize("type_", [Rows, Impulse])
 @pytest.mark.parametrize("settings", [{}, {"integrator": "rk4", "step": 1e-3}, {"method": "auto"}])

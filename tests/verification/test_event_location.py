@@ -227,7 +227,6 @@ def test_turning_points_close_to_each_other(rise):
             assert [x for x, _ in found] == pytest.approx([a, a + d], abs=1e-2 * d + 1e-13 / d)
 
 
-@pytest.mark.thinned(2)
 @pytest.mark.parametrize(
     ("integrator", "settings"),
     [("dop853", TIGHT), ("dopri5", TIGHT), ("adams", TIGHT), ("radau", TIGHT),

@@ -44,7 +44,6 @@ def test_the_defaults_pass_every_case(case, attempt):
     assert [name for name, entry in result.ledger.items() if entry.ok is False] == []
 
 
-@pytest.mark.thinned(4)
 @pytest.mark.slow
 @pytest.mark.parametrize(("case", "attempt"), OTHERS, ids=titles(OTHERS))
 def test_what_passes_by_the_page_passes(case, attempt):

@@ -63,7 +63,6 @@ RIGHT = {
 }
 
 
-@pytest.mark.thinned(3)
 @pytest.mark.parametrize(
     "rtol",
     [1e-8, *(pytest.param(x, marks=pytest.mark.slow) for x in (1e-9, 1e-10, 1e-11, 1e-12)), 1e-13],

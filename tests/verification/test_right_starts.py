@@ -53,7 +53,6 @@ CHAINS = [
 ]
 
 
-@pytest.mark.thinned(2)
 @pytest.mark.parametrize("joint", ["sph", "rev"])
 @pytest.mark.parametrize(("lengths", "end"), CHAINS)
 def test_a_chain_drawn_straight_is_assembled(lengths, end, joint):
@@ -198,7 +197,6 @@ AT_ANCHOR = {
 }
 
 
-@pytest.mark.thinned(2)
 @pytest.mark.parametrize("integrator", ["dop853", "radau", "adams", "auto"])
 @pytest.mark.parametrize("name", AT_ANCHOR)
 def test_a_spring_without_natural_length_may_begin_at_its_anchor(name, integrator):

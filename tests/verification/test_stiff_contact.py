@@ -59,7 +59,6 @@ def check_ball(result, k, e, height=0.1, mass=1.0, floor=0.0):
     assert result.ledger["energy"].ok, result.ledger["energy"]
 
 
-@pytest.mark.thinned(3)
 @pytest.mark.parametrize("integrator", ["radau", "auto"])
 @pytest.mark.parametrize("e", [0.0, 0.3, 0.9])
 @pytest.mark.parametrize("k", quickly([1e5, 1e12, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11], 2))
@@ -131,7 +130,6 @@ def clutch(w_tol):
     return scene
 
 
-@pytest.mark.thinned(3)
 @pytest.mark.parametrize("integrator", ["radau", "auto"])
 @pytest.mark.parametrize("rtol", [1e-8, 1e-6])
 @pytest.mark.parametrize("w_tol", quickly([1e-3, 1e-9, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8], 2))
@@ -156,7 +154,6 @@ def test_a_clutch_meets(w_tol, rtol, integrator):
     assert result.ledger["energy"].ok
 
 
-@pytest.mark.thinned(2)
 @pytest.mark.parametrize("integrator", ["radau", "auto"])
 @pytest.mark.parametrize("kind", ["friction", "tran_friction"])
 @pytest.mark.parametrize("v_tol", [1e-3, 1e-5, 1e-7, 1e-9])
@@ -203,7 +200,6 @@ def by_scipy(sigma_0, sigma_1, t):
 
 
 @pytest.mark.slow
-@pytest.mark.thinned(2)
 @pytest.mark.parametrize("integrator", ["radau", pytest.param("auto", marks=pytest.mark.long)])
 @pytest.mark.parametrize(("sigma_0", "zeta"), [
     (1e5, 0.3), (1e6, 1.0), (1e7, 0.1), (1e7, 2.0), (1e8, 0.3), (1e9, 1.0),
@@ -244,7 +240,6 @@ def test_a_run_that_stalls_says_why_and_keeps_what_it_has(integrator):
     np.testing.assert_allclose(kept.r[:, 0, 0], expected, atol=1e-8)
 
 
-@pytest.mark.thinned(3)
 @pytest.mark.parametrize("e", [0.5, 0.9])
 @pytest.mark.parametrize("height", quickly([0.1, 0.37, 0.5]))
 @pytest.mark.parametrize(("mass", "k"), [(1e-3, 3e9), (1e-3, 5e10), (0.1, 1e12), (1.0, 1e13)])

@@ -31,7 +31,6 @@ def test_the_governor_is_stiff(governor, integrator, rtol):
     assert z == pytest.approx(GOVERNOR[0.1], abs=rtol)
 
 
-@pytest.mark.thinned(2)
 @pytest.mark.parametrize("rtol", [1e-3, 1e-8])
 @pytest.mark.parametrize("integrator", ["dopri5", "dop853"])
 @pytest.mark.parametrize(

@@ -60,7 +60,6 @@ def settings(integrator):
     return {"integrator": integrator} | ({"step": 0.01} if integrator == "rk4" else {})
 
 
-@pytest.mark.thinned(2)
 @pytest.mark.parametrize("dt", [0.05, 1.0, 6.0])
 @pytest.mark.parametrize(("method", "integrator"), PAIRS)
 def test_the_reporting_step_does_not_matter(method, integrator, dt):
@@ -73,7 +72,6 @@ def test_the_reporting_step_does_not_matter(method, integrator, dt):
     np.testing.assert_allclose(angle, result.quantity("pin.q1").values, atol=0.0)
 
 
-@pytest.mark.thinned(2)
 @pytest.mark.parametrize("reverse", [False, True])
 @pytest.mark.parametrize("dt", [0.1, 4.0])
 @pytest.mark.parametrize(
@@ -91,7 +89,6 @@ def test_a_motion_that_comes_to_rest_again_and_again(method, integrator, dt, rev
 
 
 @pytest.mark.slow
-@pytest.mark.thinned(2)
 @pytest.mark.parametrize("method", ["standard", "joint"])
 @pytest.mark.parametrize(
     ("speed", "integrator"),

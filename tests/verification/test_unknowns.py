@@ -52,7 +52,6 @@ def compiled(scene, method=None):
 
 
 @pytest.mark.slow
-@pytest.mark.thinned(2)
 @pytest.mark.parametrize("integrator", quickly(["dop853", "radau", "dopri5", "adams"], 2))
 @pytest.mark.parametrize("method", ["standard", "lsq"])
 @pytest.mark.parametrize("speed", [2.0, 6.0], ids=["to and fro", "round and round"])

@@ -47,6 +47,7 @@ def test_a_block_slides_by_what_friction_leaves():
     assert x == pytest.approx([weight, -pull, 0.0], rel=1e-14)
 
 
+@long_in_plain_python
 def test_rounding_of_the_rates_is_no_residual():
     """Of a box that comes down on four corners at 1e-5 m/s, while it slides at 1 m/s."""
     corners = [[x, y, -0.05] for x in (-0.2, 0.2) for y in (-0.15, 0.15)]

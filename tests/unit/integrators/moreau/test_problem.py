@@ -1,6 +1,7 @@
 """Groups of bodies that joints and contacts connect: each is solved as if it were alone."""
 
 import numpy as np
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 
@@ -44,6 +45,7 @@ def motion(*lifts):
     return found.reshape(len(result.t), len(lifts), LINKS, -1).swapaxes(0, 1)
 
 
+@long_in_plain_python
 def test_copies_move_as_one_alone():
     """Bit by bit, through an impact."""
     alone = motion(HIGH)[0]
@@ -51,6 +53,7 @@ def test_copies_move_as_one_alone():
         assert np.array_equal(copy, alone)
 
 
+@long_in_plain_python
 def test_a_machine_does_not_feel_the_impact_of_another_one():
     """Limit: rounding of accelerations, which are velocities over 2 ms."""
     falls, rests = motion(HIGH, 0.0)

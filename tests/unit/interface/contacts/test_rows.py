@@ -1,6 +1,7 @@
 """Kernels of every contact: what ends a mode."""
 
 import pytest
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.interface.contacts.rows import STRAYED, before_straying
@@ -36,6 +37,7 @@ def test_at_rest_the_rest_of_a_cone_is_itself_and_slip_of_rows_that_do_not_hold_
     assert before_straying(rest, fast, still) == rest
 
 
+@long_in_plain_python
 @pytest.mark.parametrize(("mass", "beside"), [(1e-9, 1e-9), (1e-6, 10.0)])
 def test_a_light_box_slips_when_a_heavy_one_does(mass, beside):
     # pulled by 2 N/s for each kg, it slips at 0.4 of its weight
