@@ -334,6 +334,7 @@ def toctrees(page, text, source):
     return found
 
 
+@pytest.mark.slow
 def test_every_model_is_in_the_gallery(source):
     """With what its page says and the quantities that it draws."""
     from dap3d_site.gallery import models

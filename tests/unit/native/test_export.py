@@ -295,6 +295,7 @@ def test_steps_go_on_from_a_state_that_is_set_behind_the_end(tmp_path):
     assert np.array_equal(run.values(states), expected)
 
 
+@pytest.mark.slow
 def test_the_example_compiles_without_a_warning_and_runs(tmp_path):
     made, library = exported(dap.load("pen1"), tmp_path, outputs=["cone.r.x", "energy.total"])
     archive = made.path / own_platform() / "libpen1.a"
@@ -441,6 +442,7 @@ def test_a_mass_beside_joints_is_a_parameter_of_stepped_contacts(tmp_path):
     assert np.array_equal(run.values(made.outputs), expected)
 
 
+@pytest.mark.slow
 def test_a_run_ends_where_contacts_have_no_room(tmp_path, monkeypatch):
     """The ball has one point, and there is room for none."""
     for module, name in ((placed_shapes, "ROOM"), (arrays, "MOST_POINTS")):
@@ -453,6 +455,7 @@ def test_a_run_ends_where_contacts_have_no_room(tmp_path, monkeypatch):
             run.step_to(t)
 
 
+@pytest.mark.slow
 def test_a_folder_of_another_model(tmp_path):
     """Its libraries go; what a user has put there stays. A folder of others is left alone."""
     first, second = dap.load("fourbar2"), dap.load("pen1")

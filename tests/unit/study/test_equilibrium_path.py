@@ -79,6 +79,7 @@ def test_truss_snaps_through(snap):
     assert snap.unit == "N"
 
 
+@pytest.mark.slow
 def test_all_points_are_equilibria(snap):
     """The load of each point is that of its height; -50 to 50 N are met where they are given."""
     z = snap.of("node.r.z")

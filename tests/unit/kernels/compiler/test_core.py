@@ -143,6 +143,7 @@ def found(request):
     return repeated(RUNS, ["differentiated"], MORE, [request.param])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "level", ["O0", pytest.param("O3", marks=[pytest.mark.slow, pytest.mark.long])]
 )

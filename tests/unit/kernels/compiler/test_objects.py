@@ -135,6 +135,7 @@ def test_code_is_made_well_once_it_has_run_for_long(tmp_path, alone, monkeypatch
     assert (tmp_path / "doubled.o").exists()
 
 
+@pytest.mark.slow
 def test_a_process_beside_makes_code_well(tmp_path, monkeypatch):
     """Its objects are taken over by the next look after they are there."""
     monkeypatch.setattr(background, "core_count", lambda: 2)

@@ -7,6 +7,7 @@ from tests.unit.native.test_export import SPRING, _written, exported, falling_ba
 import dap3d_core as dap
 
 
+@pytest.mark.slow
 @pytest.mark.every(3)
 @pytest.mark.parametrize(
     ("model", "outputs"),

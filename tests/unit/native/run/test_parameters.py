@@ -31,6 +31,7 @@ def compared(model, names, factors, folder, t_end=0.3, **settings):
     return np.array(rows), np.hstack([result.quantity(name).values for name in outputs])
 
 
+@pytest.mark.slow
 @pytest.mark.every(4)
 @pytest.mark.parametrize(
     ("model", "names"),

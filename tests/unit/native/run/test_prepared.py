@@ -204,6 +204,7 @@ def test_friction_and_restitution_are_parameters(tmp_path):
     assert np.array_equal(run.values(made.outputs), expected)
 
 
+@pytest.mark.slow
 def test_what_contacts_cannot_do_ends_the_run_with_their_name(tmp_path):
     scene = door()
     scene.bodies["door"].w, scene.bodies["door"].r_dot = (0, -1.0, 0), (0, 0, 0.5)
