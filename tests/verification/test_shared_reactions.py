@@ -214,3 +214,33 @@ def test_sweeps_refuse_each_point():
     """Runs of a sweep are judged as single ones are."""
     swept = dap.sweep(door(), {"forces.f0.mu": [0.1, 0.2]}, outputs=["leaf.w.z"], t_end=0.1)
     assert list(swept["status"].values) == [3, 3]  # failed
+
+
+def test_feet_that_share_carry_the_centre_of_what_their_cones_allow():
+    """Of the forces that hold a crate none makes |f|^2 / (2 size^2) - sum log (r^2 - |v|^2) less.
+
+    Its slope along all that may be added is the rounding of forces: 1e-14 of them.
+    """
+    mu, feet = (
+        np.array([0.5, 0.4, 0.6, 0.5]),
+        [(x, y, -0.25) for x in (-0.5, 0.5) for y in (-0.3, 0.4)],
+    )
+    pull, columns = np.array([12.0, -9.0, 5.0]), []
+    scene = dap.Scene(name="crate")
+    scene.add_body("crate", mass=MASS, Jp=(1.0, 1.0, 1.0), r=(0.0, 0.0, 0.25))
+    for k, foot in enumerate(feet):
+        scene.add_point(f"P{k}", "crate", foot)
+        scene.add_contact("ball_plane", f"foot{k}", P_i=f"P{k}", mu=mu[k])
+        columns += [[*e, *np.cross(foot, e)] for e in np.eye(3)[[2, 0, 1]]]
+    scene.add_force("weight", gravity=G)
+    scene.add_force("f", body_i="crate", f=tuple(pull))
+    result = dap.simulate(scene, t_end=0.1, dt=0.1)
+    contacts = [result.contact(f"foot{k}") for k in range(4)]
+    x = np.array([[c.normal_force[-1], *c.friction[-1, :2]] for c in contacts])
+    A, load = np.array(columns).T, np.append(pull - [0.0, 0.0, MASS * G], np.zeros(3))
+    assert A @ x.ravel() == pytest.approx(-load, abs=1e-12)
+    size = np.abs(np.linalg.lstsq(A, -load, rcond=None)[0]).max()
+    left = (mu * x[:, 0]) ** 2 - (x[:, 1:] ** 2).sum(axis=1)
+    slope = x / size**2 - 2.0 / left[:, None] * np.column_stack([mu**2 * x[:, 0], -x[:, 1:]])
+    added = np.linalg.svd(A)[2][6:]
+    assert np.abs(added @ slope.ravel()).max() < 1e-10 * np.abs(slope).max()

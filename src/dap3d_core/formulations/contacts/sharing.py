@@ -37,9 +37,9 @@ HELD, OF_REST, RATE_ROUNDING = 1e-9, 0.05, 1e-13
 FORCE_ROUNDING = 1e-12
 #: Part of the largest force that cones leave, at least, where contacts hold inside them.
 LEAST_RIM = 1e-11
-#: Of Newton's method passes at most, the decrement at which it is near, and how much more t weighs
-#: each time that it is.
-PASSES, NEAR, HEAVIER = 50, 0.25, 10.0
+#: Of Newton's method passes at most, the decrements at which it is near and at which it has ended
+#: by its next pass, and how much more t weighs each time that it is near.
+PASSES, NEAR, CENTRED, HEAVIER = 50, 0.25, 1e-6, 10.0
 #: Part of a diagonal that is rounding of a pivot.
 PIVOT = 1e-16
 
@@ -204,10 +204,12 @@ def come_inside(s: ContactArrays, free: int) -> bool:
         if t >= 0.0 and not t < terms / weight - LEAST_RIM * size:
             return False
         weight *= HEAVIER
+    before = np.inf
     for _ in range(PASSES):
         t, decrement = pass_with(s, free, 0.0, 0.0, size)
-        if not decrement > NEAR:
+        if not decrement > CENTRED or (before < NEAR and decrement > 0.5 * before):  # by rounding
             break
+        before = decrement
     return farthest_outside(s) < 0.0
 
 
