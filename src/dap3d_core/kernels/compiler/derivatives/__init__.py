@@ -20,8 +20,8 @@ Source: A. Griewank, A. Walther, Evaluating Derivatives, 2nd ed., SIAM 2008, cha
 import re
 from collections.abc import Iterator
 
-from dap3d_core.kernels.compiler.derivatives.writers import BesideWriter, WithinWriter
 from dap3d_core.kernels.compiler.derivatives.instructions import FILLING, PURE
+from dap3d_core.kernels.compiler.derivatives.writers import BesideWriter, WithinWriter
 from dap3d_core.kernels.compiler.lanes import rewritten
 
 _DEFINED = re.compile(r"^(define .*\))([^()]*{)$", re.MULTILINE)
