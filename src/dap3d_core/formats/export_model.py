@@ -19,6 +19,7 @@ from dap3d_core.interface.formats import (
     Remarks,
     ResultExporter,
 )
+from dap3d_core.kernels.runtime.sealed_files import replace_file
 from dap3d_core.registry import Registry, load_registry
 from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.extensions import extensions
@@ -93,7 +94,9 @@ def export_model(
             Mistake("", MISSING, f"{one.text}: it would be left out") for one in remarks.left_out
         )
     if path is not None:
-        _write(Path(path), text, force=force)
+        if not force and os.path.exists(path):
+            raise FileExistsError(f"{path} exists; force overwrites it")
+        replace_file(Path(path), text.encode("utf-8"))
     return ExportReport(format, text, remarks.translated, remarks.left_out)
 
 
@@ -112,17 +115,6 @@ def _beside(model: Articulation, scene: Path, target: Path) -> Articulation:
     for link in model.links.values():
         link.geometries = [named(one) for one in link.geometries]
     return model
-
-
-def _write(path: Path, text: str, *, force: bool) -> None:
-    if not force and os.path.exists(path):
-        raise FileExistsError(f"{path} exists; force overwrites it")
-    temporary = path.with_name(f".{path.name}.part")
-    try:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _plain_scene(checked: ValidatedScene) -> Scene:

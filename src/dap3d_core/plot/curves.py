@@ -10,22 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.plot.style import (
-    DASHES,
-    HEIGHT,
-    LETTERS,
-    MARKERS,
-    PALETTE,
-    PANEL_HEIGHT,
-    Picture,
-    PlainOffset,
-    folded,
-    legend_above,
-    show_rounding_flat,
-    shown_text,
-    style_axes,
-    with_unit,
-)
+from dap3d_core.plot import style
 from dap3d_core.result import Quantity, Result, UnknownNameError, find
 from dap3d_core.result.arrays import POINT
 from dap3d_core.result.post.smooth_parts import cubic, smooth_parts
@@ -114,7 +99,7 @@ class Curve(NamedTuple):
 
 
 @attrs.frozen(eq=False)
-class CurvePicture(Picture):
+class CurvePicture(style.Picture):
     """Panels of curves over one quantity: unit -> curves; a title above them.
 
     bands: unit -> modes of the contact of its curves over time.
@@ -128,7 +113,7 @@ class CurvePicture(Picture):
     @property
     def height(self) -> float:
         """A suitable height of the figure, inches."""
-        return HEIGHT if len(self.panels) == 1 else PANEL_HEIGHT * len(self.panels)
+        return style.HEIGHT if len(self.panels) == 1 else style.PANEL_HEIGHT * len(self.panels)
 
     def draw(self, figure: Figure) -> list[Axes]:
         """Draw all panels on an empty figure; returns their axes."""
@@ -137,14 +122,14 @@ class CurvePicture(Picture):
         for ax, (unit, curves) in zip(axes, self.panels.items(), strict=True):
             self._draw_panel(ax, unit, curves, height)
             if len(curves) > 1:
-                legend_above(ax, [curve.name + curve.drift for curve in curves], width)
-            style_axes(ax)
-        label = with_unit(self.x.label, self.x.unit)
-        axes[-1].set_xlabel(folded(label, 17 * width), fontsize=LETTERS)
+                style.legend_above(ax, [curve.name + curve.drift for curve in curves], width)
+            style.style_axes(ax)
+        label = style.with_unit(self.x.label, self.x.unit)
+        axes[-1].set_xlabel(style.folded(label, 17 * width), fontsize=style.LETTERS)
         if self.x.name != "t" and list(self.panels) == [self.x.unit]:  # the path of a point
             axes[0].set_aspect("equal", adjustable="datalim")
         if self.title:
-            figure.suptitle(shown_text(self.title), fontsize=LETTERS + 1)
+            figure.suptitle(style.shown_text(self.title), fontsize=style.LETTERS + 1)
         return list(axes)
 
     def draw_on(self, ax: Axes) -> Axes:
@@ -158,7 +143,7 @@ class CurvePicture(Picture):
         self._draw_panel(ax, unit, curves, ax.get_window_extent().height / ax.figure.dpi)
         if len(curves) > 1:
             ax.legend(fontsize="small", framealpha=0.8)
-        ax.set_xlabel(with_unit(self.x.label, self.x.unit))
+        ax.set_xlabel(style.with_unit(self.x.label, self.x.unit))
         return ax
 
     def _draw_panel(self, ax: Axes, unit: str, curves: Sequence[Curve], height: float) -> None:
@@ -171,19 +156,19 @@ class CurvePicture(Picture):
         several = len({curve.run for curve in curves}) > 1
         for k, curve in enumerate(curves):
             single = len(curve.quantity.values) == 1
-            dash = curve.run if several else k // len(PALETTE)
+            dash = curve.run if several else k // len(style.PALETTE)
             ax.plot(
                 *curve.points,
-                color=PALETTE[k % len(PALETTE)],
-                linestyle="none" if single else DASHES[dash % len(DASHES)],
+                color=style.PALETTE[k % len(style.PALETTE)],
+                linestyle="none" if single else style.DASHES[dash % len(style.DASHES)],
                 linewidth=1.4,
-                **self._marks(curve, MARKERS[k % len(MARKERS)] if single else "o"),
-                label=shown_text(curve.name + (curve.drift if len(curves) > 1 else "")),
+                **self._marks(curve, style.MARKERS[k % len(style.MARKERS)] if single else "o"),
+                label=style.shown_text(curve.name + (curve.drift if len(curves) > 1 else "")),
             )
         for axis in (ax.xaxis, ax.yaxis):
-            axis.set_major_formatter(PlainOffset())
-        show_rounding_flat(ax, max(curve.span for curve in curves))
-        ax.set_ylabel(folded(_y_label(unit, curves), 15 * height), fontsize=LETTERS)
+            axis.set_major_formatter(style.PlainOffset())
+        style.show_rounding_flat(ax, max(curve.span for curve in curves))
+        ax.set_ylabel(style.folded(_y_label(unit, curves), 15 * height), fontsize=style.LETTERS)
 
     def _marks(self, curve: Curve, start: str) -> dict[str, Any]:
         """Dots at the instants of a curve over time where these are few; else one at a start."""
@@ -198,7 +183,7 @@ def _y_label(unit: str, curves: Sequence[Curve]) -> str:
     labels = list(dict.fromkeys(c.quantity.label for c in curves))
     kinds = list(dict.fromkeys(c.quantity.kind for c in curves))
     words = labels[0] if len(labels) == 1 else ", ".join(kinds) if len(kinds) < 3 else ""
-    return with_unit(words + (curves[0].drift if len(curves) == 1 else ""), unit)
+    return style.with_unit(words + (curves[0].drift if len(curves) == 1 else ""), unit)
 
 
 def curve_picture(
@@ -371,5 +356,5 @@ def _shade(ax: Axes, bands: Sequence[Band]) -> None:
             ax.text(
                 0.5 * (widest.start + widest.end), 0.5, word, transform=ax.get_xaxis_transform(),
                 rotation=0 if room > ENOUGH * width else 90, ha="center", va="center",
-                fontsize=LETTERS, color="#444444",
+                fontsize=style.LETTERS, color="#444444",
             )  # fmt: skip

@@ -13,26 +13,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.plot import style
 from dap3d_core.plot.curves import curve_picture, rate_of, smooth
 from dap3d_core.plot.figure_file import check_suffix, save_figure
-from dap3d_core.plot.style import (
-    HEIGHT,
-    LETTERS,
-    PALETTE,
-    PANEL_HEIGHT,
-    REAL_PART_ROUNDING,
-    WIDTH,
-    OnePanel,
-    Picture,
-    PlainOffset,
-    folded,
-    legend_above,
-    show_rounding_flat,
-    shown_text,
-    style_axes,
-    unit_text,
-    with_unit,
-)
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result, ResultError, find
 from dap3d_core.result.errors import unknown
@@ -63,8 +46,8 @@ NO_WINDOW = (
 MOST_LABELS = 12
 #: Attribute of a path -> label, marker and colour of its special points.
 SPECIAL = {
-    "turning": ("turning point", "o", PALETTE[1]),
-    "branching": ("another path crosses", "D", PALETTE[3]),
+    "turning": ("turning point", "o", style.PALETTE[1]),
+    "branching": ("another path crosses", "D", style.PALETTE[3]),
 }
 #: A step is drawn by so many pieces; shorter steps, parts of the range, are at a corner.
 BETWEEN, CORNER = 8, 1e-4
@@ -76,7 +59,7 @@ CURVE_HEIGHT, RESIDUAL_HEIGHT = 1.7, 0.9
 
 def picture_of(
     result: "Drawable", quantities: Sequence[str], x: str | None, at: Mapping[str, float] | None
-) -> Picture:
+) -> style.Picture:
     """The picture of a result, of several by name, of a fit or of a sweep; errors as ``plot``."""
     names = [quantities] if isinstance(quantities, str) else list(quantities)
     if hasattr(result, "data_vars"):  # a data set of xarray, which is a mapping as well
@@ -152,7 +135,7 @@ def plot(
         return picture.draw_on(ax)
     from matplotlib import pyplot
 
-    size = (WIDTH, picture.height)
+    size = (style.WIDTH, picture.height)
     return picture.draw(pyplot.figure(figsize=size, layout="constrained", dpi=SCRIPT_DPI))[0]
 
 
@@ -163,7 +146,7 @@ def save_plot(
     *,
     x: str | None = None,
     at: Mapping[str, float] | None = None,
-    width: float = WIDTH,
+    width: float = style.WIDTH,
     height: float | None = None,
     dpi: float = 200.0,
     force: bool = False,
@@ -194,7 +177,7 @@ def show_plot(
     *,
     x: str | None = None,
     at: Mapping[str, float] | None = None,
-    width: float = WIDTH,
+    width: float = style.WIDTH,
     height: float | None = None,
 ) -> None:
     """Draw quantities as ``plot`` does, in a window; returns when it is closed.
@@ -219,7 +202,7 @@ def show_plot(
     pyplot.close(figure)
 
 
-class EigenvaluePicture(OnePanel):
+class EigenvaluePicture(style.OnePanel):
     """The eigenvalues of a linearisation.
 
     Modes have their numbers; those that grow are drawn as crosses, to the right of the axis.
@@ -232,22 +215,22 @@ class EigenvaluePicture(OnePanel):
         """Draw on axes of the user."""
         values = self.linearization.eigenvalues
         size = float(np.max(np.abs(values), initial=0.0)) or 1.0
-        real = np.where(np.abs(values.real) > REAL_PART_ROUNDING * size, values.real, 0.0)
+        real = np.where(np.abs(values.real) > style.REAL_PART_ROUNDING * size, values.real, 0.0)
         grows = real > 0.0
         ax.axvline(0.0, color="0.6", linewidth=0.8)
-        ax.plot(real[~grows], values.imag[~grows], "o", color=PALETTE[0], markersize=4.5)
-        ax.plot(real[grows], values.imag[grows], "X", color=PALETTE[1], markersize=5.5)
+        ax.plot(real[~grows], values.imag[~grows], "o", color=style.PALETTE[0], markersize=4.5)
+        ax.plot(real[grows], values.imag[grows], "X", color=style.PALETTE[1], markersize=5.5)
         modes = self.linearization.mode_eigenvalues[:MOST_LABELS]
         for value, numbers in _labels_of(modes.tolist(), np.ptp([*values.real, 0.0]), 2.0 * size):
-            x = value.real if abs(value.real) > REAL_PART_ROUNDING * size else 0.0
+            x = value.real if abs(value.real) > style.REAL_PART_ROUNDING * size else 0.0
             ax.annotate(numbers, (x, value.imag), xytext=(4, 3), textcoords="offset points",
-                        fontsize=LETTERS)  # fmt: skip
+                        fontsize=style.LETTERS)  # fmt: skip
         if not np.any(real):
             ax.set_xlim(-size, size)
         ax.margins(0.12)
-        ax.set_xlabel("real part [1/s]", fontsize=LETTERS)
-        ax.set_ylabel("imaginary part [rad/s]", fontsize=LETTERS)
-        style_axes(ax)
+        ax.set_xlabel("real part [1/s]", fontsize=style.LETTERS)
+        ax.set_ylabel("imaginary part [rad/s]", fontsize=style.LETTERS)
+        style.style_axes(ax)
         return ax
 
 
@@ -280,7 +263,7 @@ class Panel(NamedTuple):
     unit: str
 
 
-class EquilibriumPathPicture(Picture):
+class EquilibriumPathPicture(style.Picture):
     """A panel for each quantity, over the parameter."""
 
     def __init__(self, path: "EquilibriumPath", quantities: Sequence[str]) -> None:
@@ -290,7 +273,7 @@ class EquilibriumPathPicture(Picture):
     @property
     def height(self) -> float:
         """A suitable height of the figure, inches."""
-        return HEIGHT if len(self.panels) == 1 else PANEL_HEIGHT * len(self.panels)
+        return style.HEIGHT if len(self.panels) == 1 else style.PANEL_HEIGHT * len(self.panels)
 
     def draw(self, figure: Figure) -> list[Axes]:
         """Draw all panels on an empty figure; returns their axes."""
@@ -300,7 +283,7 @@ class EquilibriumPathPicture(Picture):
             self._draw_panel(ax, panel, height)
         _, labels = axes[0].get_legend_handles_labels()
         if labels:
-            legend_above(axes[0], labels, width)
+            style.legend_above(axes[0], labels, width)
         for ax in axes[:-1]:
             ax.set_xlabel("")
         return list(axes)
@@ -311,13 +294,13 @@ class EquilibriumPathPicture(Picture):
             raise ValueError("one axes takes one quantity: leave ax out")
         self._draw_panel(ax, self.panels[0], ax.get_window_extent().height / ax.figure.dpi)
         if ax.get_legend_handles_labels()[1]:
-            ax.legend(fontsize=LETTERS, frameon=False)
+            ax.legend(fontsize=style.LETTERS, frameon=False)
         return ax
 
     def _draw_panel(self, ax: Axes, panel: Panel, height: float) -> None:
         path = self.path
         for k, (name, values) in enumerate(zip(panel.names, panel.values.T, strict=True)):
-            colour = PALETTE[k % len(PALETTE)]
+            colour = style.PALETTE[k % len(style.PALETTE)]
             fine, x, y = _smooth(path.length, path.values, values)
             for stable, rows in _runs(path):
                 dash = next(dash for which, _, dash in STABILITY if which == stable)
@@ -325,7 +308,7 @@ class EquilibriumPathPicture(Picture):
                 part = (fine >= ends[0]) & (fine <= ends[1])
                 ax.plot(x[part], y[part], dash, color=colour, linewidth=1.4)
             if name:
-                ax.plot([], [], color=colour, linewidth=1.4, label=shown_text(name))
+                ax.plot([], [], color=colour, linewidth=1.4, label=style.shown_text(name))
         if not (path.stable.all() or not path.stable.any()):
             for _, label, dash in STABILITY:
                 ax.plot([], [], dash, color="0.3", linewidth=1.4, label=label)
@@ -336,12 +319,12 @@ class EquilibriumPathPicture(Picture):
                 ax.plot(x, panel.values[where].ravel(), marker, color=colour, linestyle="",
                         markersize=5.0, label=label, zorder=3)  # fmt: skip
         for axis in (ax.xaxis, ax.yaxis):
-            axis.set_major_formatter(PlainOffset())
-        show_rounding_flat(ax)
-        ax.set_xlabel(with_unit(path.parameter, path.unit), fontsize=LETTERS)
-        label = with_unit(panel.label, panel.unit)
-        ax.set_ylabel(folded(label, 15 * height), fontsize=LETTERS)
-        style_axes(ax)
+            axis.set_major_formatter(style.PlainOffset())
+        style.show_rounding_flat(ax)
+        ax.set_xlabel(style.with_unit(path.parameter, path.unit), fontsize=style.LETTERS)
+        label = style.with_unit(panel.label, panel.unit)
+        ax.set_ylabel(style.folded(label, 15 * height), fontsize=style.LETTERS)
+        style.style_axes(ax)
 
 
 def _panel(path: "EquilibriumPath", name: str) -> Panel:
@@ -383,7 +366,7 @@ def _runs(path: "EquilibriumPath") -> Iterator[tuple[bool, slice]]:
 
 
 @attrs.frozen(eq=False)
-class FitPicture(Picture):
+class FitPicture(style.Picture):
     """Outputs of a fit, each with its residuals below."""
 
     refusal = "a fit is drawn over time, on a figure of its own: leave x, ax out"
@@ -411,40 +394,42 @@ class FitPicture(Picture):
         for name, above, below in zip(self.outputs, axes[::2], axes[1::2], strict=True):
             self._draw_output(name, above, below)
             for ax in (above, below):
-                style_axes(ax)
-                ax.yaxis.set_major_formatter(PlainOffset())
+                style.style_axes(ax)
+                ax.yaxis.set_major_formatter(style.PlainOffset())
                 ax.ticklabel_format(axis="y", scilimits=(-3, 4))
-        legend_above(axes[0], ("measured", "fitted"), figure.get_figwidth())
-        axes[-1].set_xlabel("time [s]", fontsize=LETTERS)
+        style.legend_above(axes[0], ("measured", "fitted"), figure.get_figwidth())
+        axes[-1].set_xlabel("time [s]", fontsize=style.LETTERS)
         figure.align_ylabels(axes)
         if self.fit.result.record.title:
-            figure.suptitle(shown_text(self.fit.result.record.title), fontsize=LETTERS + 1)
+            figure.suptitle(
+                style.shown_text(self.fit.result.record.title), fontsize=style.LETTERS + 1
+            )
         return list(axes)
 
     def _draw_output(self, name: str, above: Axes, below: Axes) -> None:
         fit, t = self.fit, self.fit.result.t
         curve = find(fit.result, fit.quantities[name])
         points = smooth(fit.result, t, curve.values, np.ones(len(t)), rate_of(fit.result, curve))
-        marks: Any = dict(color=PALETTE[1], linestyle="none", marker="o", markersize=2.5,
+        marks: Any = dict(color=style.PALETTE[1], linestyle="none", marker="o", markersize=2.5,
                           markeredgewidth=0.0, alpha=0.7)  # fmt: skip
         above.plot(fit.t, fit.measured[name], label="measured", **marks)
-        above.plot(*points, color=PALETTE[0], linewidth=1.2, label="fitted")
-        label = folded(with_unit(curve.label, curve.unit), 15 * CURVE_HEIGHT)
-        above.set_ylabel(label, fontsize=LETTERS)
+        above.plot(*points, color=style.PALETTE[0], linewidth=1.2, label="fitted")
+        label = style.folded(style.with_unit(curve.label, curve.unit), 15 * CURVE_HEIGHT)
+        above.set_ylabel(label, fontsize=style.LETTERS)
         sigma, residuals = fit.sigma.get(name), fit.residuals[name]
         if sigma is None:
             below.plot(fit.t, residuals, **marks)
         else:
             below.errorbar(fit.t, residuals, sigma, elinewidth=0.5, **marks)
-        below.axhline(0.0, color=PALETTE[0], linewidth=1.0)
-        below.set_ylabel(f"residual\n{unit_text(curve.unit)}", fontsize=LETTERS)
+        below.axhline(0.0, color=style.PALETTE[0], linewidth=1.0)
+        below.set_ylabel(f"residual\n{style.unit_text(curve.unit)}", fontsize=style.LETTERS)
         reach = np.abs(residuals) + (0.0 if sigma is None else sigma)
         if (reach > 0.0).any():
             limit = 1.15 * np.nanmax(reach)
             below.set_ylim(-limit, limit)
 
 
-class SensitivityPicture(Picture):
+class SensitivityPicture(style.Picture):
     """For each quantity its elasticities at the end, and p dq/dp over time.
 
     Attributes:
@@ -460,7 +445,7 @@ class SensitivityPicture(Picture):
     @property
     def height(self) -> float:
         """A suitable height of the figure, inches."""
-        return PANEL_HEIGHT * len(self.quantities)
+        return style.PANEL_HEIGHT * len(self.quantities)
 
     def draw(self, figure: Figure) -> list[Axes]:
         """Draw on an empty figure."""
@@ -468,16 +453,16 @@ class SensitivityPicture(Picture):
         panels = figure.subplots(len(self.quantities), 2, squeeze=False)
         for (bars, curves), quantity in zip(panels, self.quantities, strict=True):
             elasticities = np.nan_to_num(found.elasticities(quantity), posinf=0.0, neginf=0.0)
-            colors = [PALETTE[k % len(PALETTE)] for k in range(len(found.names))]
+            colors = [style.PALETTE[k % len(style.PALETTE)] for k in range(len(found.names))]
             bars.barh(list(found.names), elasticities, color=colors)
             bars.invert_yaxis()
             bars.axvline(0.0, color="0.5", linewidth=0.8)
-            bars.set_xlabel(f"% of {quantity} by 1 %", fontsize=LETTERS)
+            bars.set_xlabel(f"% of {quantity} by 1 %", fontsize=style.LETTERS)
             for k, curve in enumerate((found.of(quantity) * found.values).T):
                 curves.plot(found.result.t, curve, color=colors[k], linewidth=1.2)
-            curves.set_xlabel("t [s]", fontsize=LETTERS)
-            curves.set_ylabel(f"p d {quantity} / dp", fontsize=LETTERS)
+            curves.set_xlabel("t [s]", fontsize=style.LETTERS)
+            curves.set_ylabel(f"p d {quantity} / dp", fontsize=style.LETTERS)
         axes = [one for row in panels for one in row]
         for one in axes:
-            style_axes(one)
+            style.style_axes(one)
         return axes

@@ -10,19 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.plot.style import (
-    DASHES,
-    LETTERS,
-    PALETTE,
-    PANEL_HEIGHT,
-    REAL_PART_ROUNDING,
-    OnePanel,
-    Picture,
-    folded,
-    legend_above,
-    style_axes,
-    with_unit,
-)
+from dap3d_core.plot import style
 from dap3d_core.plot.sweep.panels import LINE_COLORS, norm_of
 
 if TYPE_CHECKING:
@@ -30,8 +18,8 @@ if TYPE_CHECKING:
     from dap3d_core.study.modes_over import ModesOver
 
 #: The colour of what grows, which no curve has.
-GROWS = PALETTE[1]
-COLOURS = tuple(colour for colour in PALETTE if colour != GROWS)
+GROWS = style.PALETTE[1]
+COLOURS = tuple(colour for colour in style.PALETTE if colour != GROWS)
 #: What is drawn, by name; frequencies by default.
 FREQUENCIES, EIGENVALUES = "frequencies", "eigenvalues"
 #: Points of a curve on which a pair meets the real axis.
@@ -43,7 +31,7 @@ QUARTER = 90.0
 
 def modes_over_picture(
     modes: "ModesOver", names: Sequence[str], x: str | None, at: Mapping[str, float] | None
-) -> Picture:
+) -> style.Picture:
     """The Campbell diagram of modes over a parameter, or their root locus; errors as ``plot``."""
     if list(names) not in ([], [FREQUENCIES], [EIGENVALUES]) or x is not None or at:
         raise ValueError(
@@ -53,7 +41,7 @@ def modes_over_picture(
     return RootLocusPicture(modes) if EIGENVALUES in names else ModesOverPicture(modes)
 
 
-class ModesOverPicture(OnePanel):
+class ModesOverPicture(style.OnePanel):
     """Frequency of each mode over the parameter; crosses where its motion grows."""
 
     def __init__(self, modes: "ModesOver") -> None:
@@ -65,20 +53,20 @@ class ModesOverPicture(OnePanel):
         x, f, grows = found.values, found.frequencies, found.grows
         for k in range(f.shape[1]):
             ax.plot(x, f[:, k], color=COLOURS[k % len(COLOURS)], linewidth=1.2,
-                    linestyle=DASHES[k // len(COLOURS) % len(DASHES)])  # fmt: skip
+                    linestyle=style.DASHES[k // len(COLOURS) % len(style.DASHES)])  # fmt: skip
         if np.any(grows):
             row, mode = np.nonzero(grows)
             ax.plot(x[row], f[row, mode], "X", color=GROWS, markersize=4.5, linestyle="",
                     label="grows")  # fmt: skip
-            ax.legend(fontsize=LETTERS, frameon=False)
+            ax.legend(fontsize=style.LETTERS, frameon=False)
         ax.set_ylim(bottom=0.0)
-        ax.set_xlabel(with_unit(found.parameter, found.unit), fontsize=LETTERS)
-        ax.set_ylabel("frequency [Hz]", fontsize=LETTERS)
-        style_axes(ax)
+        ax.set_xlabel(style.with_unit(found.parameter, found.unit), fontsize=style.LETTERS)
+        ax.set_ylabel("frequency [Hz]", fontsize=style.LETTERS)
+        style.style_axes(ax)
         return ax
 
 
-class RootLocusPicture(OnePanel):
+class RootLocusPicture(style.OnePanel):
     """Eigenvalues in the complex plane, coloured by the parameter.
 
     Circles are those at the first value, squares those at the last one; motions grow on the tinted
@@ -93,24 +81,24 @@ class RootLocusPicture(OnePanel):
         ax = figure.add_subplot()
         lines = self._draw_lines(ax)
         bar = figure.colorbar(lines, ax=ax, pad=0.02)
-        bar.ax.tick_params(labelsize=LETTERS)
-        label = with_unit(self.modes.parameter, self.modes.unit)
-        bar.set_label(folded(label, 15 * figure.get_figheight()), fontsize=LETTERS)
+        bar.ax.tick_params(labelsize=style.LETTERS)
+        label = style.with_unit(self.modes.parameter, self.modes.unit)
+        bar.set_label(style.folded(label, 15 * figure.get_figheight()), fontsize=style.LETTERS)
         _, labels = ax.get_legend_handles_labels()
-        legend_above(ax, labels, figure.get_figwidth())
+        style.legend_above(ax, labels, figure.get_figwidth())
         return [ax]
 
     def draw_on(self, ax: Axes) -> Axes:
         """Draw on axes of the user."""
         self._draw_lines(ax)
-        ax.legend(fontsize=LETTERS, frameon=False)
+        ax.legend(fontsize=style.LETTERS, frameon=False)
         return ax
 
     def _draw_lines(self, ax: Axes) -> LineCollection:
         found, x = self.modes, self.modes.values
         values = np.where(np.isnan(found.eigenvalues), complex(np.nan, np.nan), found.eigenvalues)
         size = float(np.nanmax(np.abs(values), initial=0.0)) or 1.0
-        values.real[np.abs(values.real) <= REAL_PART_ROUNDING * size] = 0.0
+        values.real[np.abs(values.real) <= style.REAL_PART_ROUNDING * size] = 0.0
         norm = norm_of(x)
         curves = list(_loci(x, values))
         points = [np.column_stack([z.real, z.imag]) for _, z in curves]
@@ -133,9 +121,9 @@ class RootLocusPicture(OnePanel):
         if right > 0.0:
             ax.axvspan(0.0, right, color=GROWS, alpha=0.08, linewidth=0.0, zorder=0)
             ax.set_xlim(left, right)
-        ax.set_xlabel("real part [1/s]", fontsize=LETTERS)
-        ax.set_ylabel("imaginary part [rad/s]", fontsize=LETTERS)
-        style_axes(ax)
+        ax.set_xlabel("real part [1/s]", fontsize=style.LETTERS)
+        ax.set_ylabel("imaginary part [rad/s]", fontsize=style.LETTERS)
+        style.style_axes(ax)
         return lines
 
 
@@ -182,12 +170,12 @@ def _meeting(pair: complex, reals: "Complex") -> tuple[Floats, list["Complex"]]:
     parts = np.sort(np.append(np.linspace(0.0, 1.0, MEETING), below / (below + above)))
     mean = pair.real + parts * (np.mean(reals.real) - pair.real)
     square = parts * above - (1.0 - parts) * below
-    square[np.abs(square) <= REAL_PART_ROUNDING * (below + above)] = 0.0
+    square[np.abs(square) <= style.REAL_PART_ROUNDING * (below + above)] = 0.0
     root = np.sqrt(square.astype(complex))
     return parts, [mean + root, mean - root]
 
 
-class BodePicture(Picture):
+class BodePicture(style.Picture):
     """Gain and phase of each output over each input, on logarithmic axes.
 
     Attributes:
@@ -211,7 +199,7 @@ class BodePicture(Picture):
     @property
     def height(self) -> float:
         """A suitable height of the figure, inches."""
-        return 2.0 * PANEL_HEIGHT
+        return 2.0 * style.PANEL_HEIGHT
 
     def draw(self, figure: Figure) -> list[Axes]:
         """Draw on an empty figure."""
@@ -220,24 +208,25 @@ class BodePicture(Picture):
         for n, (j, i) in enumerate(pairs):
             values = self.response[:, j, i]
             finite = np.isfinite(values)
-            style = {"color": PALETTE[n % len(PALETTE)], "linewidth": 1.2,
-                     "linestyle": DASHES[n // len(PALETTE) % len(DASHES)]}  # fmt: skip
+            round_, color = divmod(n, len(style.PALETTE))
+            look = {"color": style.PALETTE[color], "linewidth": 1.2,
+                    "linestyle": style.DASHES[round_ % len(style.DASHES)]}  # fmt: skip
             label = f"{self.outputs[j]} / {self.inputs[i]}"
             gain.plot(
-                self.frequencies, np.where(finite, np.abs(values), np.nan), label=label, **style
+                self.frequencies, np.where(finite, np.abs(values), np.nan), label=label, **look
             )
             angle = np.degrees(np.unwrap(np.angle(values[finite])))
-            phase.plot(self.frequencies[finite], angle, **style)
+            phase.plot(self.frequencies[finite], angle, **look)
         gain.set_xscale("log")
         if np.any(np.abs(self.response[np.isfinite(self.response)]) > 0.0):
             gain.set_yscale("log")
-        gain.set_ylabel("gain", fontsize=LETTERS)
-        phase.set_ylabel("phase [deg]", fontsize=LETTERS)
-        phase.set_xlabel("frequency [Hz]", fontsize=LETTERS)
+        gain.set_ylabel("gain", fontsize=style.LETTERS)
+        phase.set_ylabel("phase [deg]", fontsize=style.LETTERS)
+        phase.set_xlabel("frequency [Hz]", fontsize=style.LETTERS)
         low, high = phase.get_ylim()
         if high - low > QUARTER:
             phase.set_yticks(np.arange(np.ceil(low / QUARTER), high / QUARTER) * QUARTER)
         for axes in (gain, phase):
-            style_axes(axes)
-        gain.legend(fontsize=LETTERS, frameon=False)
+            style.style_axes(axes)
+        gain.legend(fontsize=style.LETTERS, frameon=False)
         return [gain, phase]

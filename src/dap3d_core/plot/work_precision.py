@@ -10,17 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
+from dap3d_core.plot import style
 from dap3d_core.plot.figure_file import save_figure
-from dap3d_core.plot.style import (
-    DASHES,
-    LETTERS,
-    MARKERS,
-    PALETTE,
-    WIDTH,
-    legend_below,
-    shown_text,
-    style_axes,
-)
 
 #: Inches.
 HEIGHT = 4.0
@@ -44,7 +35,7 @@ def save_work_precision(
     title: str = "",
     uncertainty: float | None = None,
     *,
-    width: float = WIDTH,
+    width: float = style.WIDTH,
     height: float = HEIGHT,
     dpi: float = 200.0,
     force: bool = False,
@@ -97,18 +88,18 @@ def draw_work_precision(
         low, high = ax.get_xlim()
         ax.axvspan(min(low, uncertainty), uncertainty, color=BAND, zorder=0)
         ax.set_xlim(low, high)
-    ax.set_xlabel("error e", fontsize=LETTERS)
-    ax.set_ylabel("wall time", fontsize=LETTERS)
-    style_axes(ax)
-    keys = [Line2D([], [], color=PALETTE[i % len(PALETTE)], linewidth=2.5, label=name)
+    ax.set_xlabel("error e", fontsize=style.LETTERS)
+    ax.set_ylabel("wall time", fontsize=style.LETTERS)
+    style.style_axes(ax)
+    keys = [Line2D([], [], color=style.PALETTE[i % len(style.PALETTE)], linewidth=2.5, label=name)
             for i, name in enumerate(integrators)]  # fmt: skip
     keys += [Line2D([], [], **(_line_style(0, j) | {"color": "0.25"}), label=name)
              for j, name in enumerate(methods)]  # fmt: skip
     greys = [(FRONT, "fastest"), (BAND, "below uncertainty")][: 2 if uncertainty else 1]
     keys += [Line2D([], [], color=grey, linewidth=7.0, label=label) for grey, label in greys]
-    legend_below(figure, keys, 2, line_length=2.4)
+    style.legend_below(figure, keys, 2, line_length=2.4)
     if title:
-        ax.set_title(shown_text(title), fontsize=LETTERS + 1)
+        ax.set_title(style.shown_text(title), fontsize=style.LETTERS + 1)
     return ax
 
 
@@ -127,9 +118,9 @@ def _set_ticks(ax: Axes) -> None:
 
 def _line_style(integrator: int, method: int) -> dict[str, Any]:
     return {
-        "color": PALETTE[integrator % len(PALETTE)],
-        "linestyle": DASHES[method % len(DASHES)],
-        "marker": MARKERS[method % len(MARKERS)],
+        "color": style.PALETTE[integrator % len(style.PALETTE)],
+        "linestyle": style.DASHES[method % len(style.DASHES)],
+        "marker": style.MARKERS[method % len(style.MARKERS)],
         "markersize": 4.5,
         "markerfacecolor": "white",
         "linewidth": 1.4,

@@ -17,8 +17,8 @@ from dap3d_core.registry.suggestions import did_you_mean
 
 #: Module of each kind's hook and base class, and the name of the class.
 _BASES = {
-    "importer": ("dap3d_core.interface.formats.format_types", "Importer"),
-    "exporter": ("dap3d_core.interface.formats.format_types", "Exporter"),
+    "importer": ("dap3d_core.interface.formats", "Importer"),
+    "exporter": ("dap3d_core.interface.formats", "Exporter"),
     "integrator": ("dap3d_core.interface.integrators", "RungeKuttaMethod"),
     "shape": ("dap3d_core.interface.shapes", "ShapeKind"),
 }

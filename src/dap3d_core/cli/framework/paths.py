@@ -83,14 +83,10 @@ def writable(
 
 def write_text(path: Path, text: str) -> None:
     """Replace a file as a whole; a link is replaced, never followed."""
-    temporary = path.with_name(f".{os.urandom(16).hex()}.part")
+    from dap3d_core.kernels.runtime.sealed_files import replace_file
+
     try:
-        try:
-            with temporary.open("x", encoding="utf-8", newline="\n") as file:
-                file.write(text)
-            os.replace(temporary, path)
-        finally:
-            temporary.unlink(missing_ok=True)
+        replace_file(path, text.encode("utf-8"))
     except OSError as error:
         raise Refused(f"cannot write {path}: {error.strerror or error}") from error
 

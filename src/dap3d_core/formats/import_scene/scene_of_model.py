@@ -7,12 +7,14 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.formats.import_scene.actuators import add_actuators, add_held, add_tendons
-from dap3d_core.formats.import_scene.ball_forces import (
+from dap3d_core.formats.import_scene.actuators import (
     NO_LIMITS,
     STOP_TIME,
+    add_actuators,
     add_ball_forces,
     add_drag,
+    add_held,
+    add_tendons,
 )
 from dap3d_core.formats.import_scene.joints import (
     add_couplings,

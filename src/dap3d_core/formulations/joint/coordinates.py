@@ -14,29 +14,8 @@ from dap3d_core.assembly.motion.classify import classify
 from dap3d_core.assembly.motion.joint_motion import ModelMotions
 from dap3d_core.formulations import FUNCTIONS
 from dap3d_core.formulations.coordinates import Coordinates
+from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.formulations.joint.equations import body_state
-from dap3d_core.formulations.joint.node_layout import (
-    CENTRE,
-    CHILD,
-    CHILD_BLOCK,
-    CONSTANT_WIDTH,
-    COORDINATE,
-    FIRST_ROW,
-    FLAGS,
-    FREE,
-    IS_ALONE,
-    JOINT_PARENT,
-    JOINT_WIDTH,
-    MASS,
-    MOTION,
-    PARENT_BLOCK,
-    PRISMATIC,
-    RATE,
-    REVOLUTE,
-    ROW_COUNT,
-    SPHERICAL,
-    WORK_WIDTH,
-)
 from dap3d_core.formulations.joint.tree_nodes import (
     SEGMENTS,
     Reference,
@@ -69,8 +48,8 @@ QUANTITIES = {
 }  # fmt: skip
 #: Motion of a node -> its noun, of one and of several.
 NOUNS = {
-    REVOLUTE: ("angle", "angles"), PRISMATIC: ("length", "lengths"),
-    SPHERICAL: ("ball", "balls"), FREE: ("free body", "free bodies"),
+    node.REVOLUTE: ("angle", "angles"), node.PRISMATIC: ("length", "lengths"),
+    node.SPHERICAL: ("ball", "balls"), node.FREE: ("free body", "free bodies"),
 }  # fmt: skip
 #: Segments of rates.
 RATES = ("angle_rates", "length_rates", "rotation_rates", "pose_rates")
@@ -101,7 +80,7 @@ class TreeCoordinates(Coordinates):
         self.size = self.nodes.layout.size - 1
         self.length_count = len(self.kept)
         if self.kept:  # their loads pass a body with the factors of its inertia
-            self.nodes.table[:, FLAGS] &= ~IS_ALONE
+            self.nodes.table[:, node.FLAGS] &= ~node.IS_ALONE
         #: The last start of a run: u, the constants of the tree, y.
         self._last: tuple[Floats, Floats, Floats] | None = None
         rows = _kept_rows(evaluator, self.nodes, tuple(self.kept)) if self.kept else None
@@ -128,8 +107,8 @@ class TreeCoordinates(Coordinates):
         """As of ``Coordinates``."""
         table, found = self.nodes.table, np.full(self.size, -1)
         for motion, (_, _, size, rate_size) in SEGMENTS.items():
-            nodes = 1 + np.flatnonzero(table[1:, MOTION] == motion)
-            for column, count in ((COORDINATE, size), (RATE, rate_size)):
+            nodes = 1 + np.flatnonzero(table[1:, node.MOTION] == motion)
+            for column, count in ((node.COORDINATE, size), (node.RATE, rate_size)):
                 places = table[nodes, column][:, None] + np.arange(count)
                 found[places] = self.nodes.frame[nodes][:, None] - 1
         return found
@@ -146,7 +125,7 @@ class TreeCoordinates(Coordinates):
 
     def structure(self) -> tuple[str, str]:
         """As of ``Coordinates``."""
-        table = self.nodes.table[1:, MOTION]
+        table = self.nodes.table[1:, node.MOTION]
         counts = {motion: int(np.count_nonzero(table == motion)) for motion in NOUNS}
         parts = [f"{n} {NOUNS[motion][n > 1]}" for motion, n in counts.items() if n]
         nodes = f"{len(table)} node{'s' if len(table) != 1 else ''}"
@@ -217,13 +196,13 @@ class TreeCoordinates(Coordinates):
 
     def inertia_places(self, bodies: Integers) -> Integers:
         """(7 b,) indices in the tree's constants of the mass and inertia of each."""
-        first = CONSTANT_WIDTH * self._node_of[bodies] + MASS
+        first = node.CONSTANT_WIDTH * self._node_of[bodies] + node.MASS
         return (first[:, None] + np.arange(7)).ravel()
 
     def inertias(self, bodies: Integers, mass: Floats, Jp: Floats) -> Floats:
         """(k, 7 b) numbers for ``inertia_places`` of masses (k, b) and inertias (k, b, 3, 3)."""
-        constants = self._tree.constants.reshape(-1, CONSTANT_WIDTH)
-        centre = constants[self._node_of[bodies], CENTRE : CENTRE + 3]
+        constants = self._tree.constants.reshape(-1, node.CONSTANT_WIDTH)
+        centre = constants[self._node_of[bodies], node.CENTRE : node.CENTRE + 3]
         return inertias_about(centre, mass, Jp).reshape(len(mass), -1)
 
     def body_states(self, y: Floats) -> Floats:
@@ -340,13 +319,13 @@ def _with_tree(
     bodies, count = len(system.body), len(nodes.table)
     places = np.zeros((nodes.row_count, BODY_WIDTH))
     places[:bodies] = system.body
-    revolutes = int(np.count_nonzero(nodes.table[1:, MOTION] == REVOLUTE))
+    revolutes = int(np.count_nonzero(nodes.table[1:, node.MOTION] == node.REVOLUTE))
     arrays = TreeArrays(
         nodes=nodes.table,
         joints=_joints(tree, model, plan),
         places=places,
-        constants=np.zeros(count * CONSTANT_WIDTH),
-        work=np.zeros(count * WORK_WIDTH),
+        constants=np.zeros(count * node.CONSTANT_WIDTH),
+        work=np.zeros(count * node.WORK_WIDTH),
         half_angles=np.zeros((2, revolutes)),
         scratch=np.zeros(48),
         force=np.zeros_like(system.force),
@@ -364,14 +343,14 @@ def turns_of_coordinates(turns: Integers, model: Model, nodes: TreeNodes) -> Int
     keys = angles.coordinates @ (MOST_PARTS, 1)
     for group in nodes.groups:
         joints = group.moves.joints if group.moves else np.zeros(0, dtype=np.int64)
-        for part in np.flatnonzero(np.equal(group.motions, REVOLUTE)).tolist():
+        for part in np.flatnonzero(np.equal(group.motions, node.REVOLUTE)).tolist():
             first = np.searchsorted(keys, MOST_PARTS * joints)
             is_reversed = angles.bodies[first, 0] != group.children
             k = np.where(is_reversed, len(group.motions) - 1 - part, part)
             rows = np.searchsorted(keys, MOST_PARTS * joints + k)
             chain = nodes.table[group.nodes[:, part]]
-            table[rows, turn_columns.COORDINATE] = chain[:, COORDINATE]
-            table[rows, turn_columns.COORDINATE_RATE] = chain[:, RATE]
+            table[rows, turn_columns.COORDINATE] = chain[:, node.COORDINATE]
+            table[rows, turn_columns.COORDINATE_RATE] = chain[:, node.RATE]
     return table
 
 
@@ -396,10 +375,13 @@ def _joints(tree: SpanningForest, model: Model, plan: Plan) -> Integers:
         strict=True,
     ):  # fmt: skip
         if k >= 0:
-            row, slots, blocks = [0] * JOINT_WIDTH, model.joint_slots[k], plan.joint_block[k]
-            row[CHILD_BLOCK], row[CHILD] = blocks[slots.index(child)], 6 * child
+            row, slots, blocks = [0] * node.JOINT_WIDTH, model.joint_slots[k], plan.joint_block[k]
+            row[node.CHILD_BLOCK], row[node.CHILD] = blocks[slots.index(child)], 6 * child
             if parent:
-                row[PARENT_BLOCK], row[JOINT_PARENT] = blocks[slots.index(parent)], 6 * parent
-            row[ROW_COUNT], row[FIRST_ROW] = model.joint_rows[k], plan.joint_row[k]
+                row[node.PARENT_BLOCK], row[node.JOINT_PARENT] = (
+                    blocks[slots.index(parent)],
+                    6 * parent,
+                )
+            row[node.ROW_COUNT], row[node.FIRST_ROW] = model.joint_rows[k], plan.joint_row[k]
             rows.append(row)
-    return np.array(rows, dtype=np.int64).reshape(-1, JOINT_WIDTH)
+    return np.array(rows, dtype=np.int64).reshape(-1, node.JOINT_WIDTH)

@@ -30,8 +30,8 @@ from dap3d_core.assembly.turns import has_measured
 from dap3d_core.formulations.common.constraints import linearise, report_levels, report_multipliers
 from dap3d_core.formulations.common.friction import has_friction, solve_with_friction
 from dap3d_core.formulations.common.switching_functions import count, counts_own_angles
+from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.formulations.joint.multipliers import joint_multipliers, scale_accelerations
-from dap3d_core.formulations.joint.node_layout import COORDINATE, FREE, MOTION, SPHERICAL
 from dap3d_core.formulations.joint.place import place_tree
 from dap3d_core.formulations.joint.reduce import reduce_tree
 from dap3d_core.formulations.joint.spread import body_accelerations, spread_tree
@@ -131,9 +131,9 @@ def normalise_rotations(y: Floats, system: System) -> None:
     """Bring Euler parameters to unit length."""
     nodes = system.tree.nodes
     for n in range(1, nodes.shape[0]):
-        motion, i = nodes[n, MOTION], nodes[n, COORDINATE]
-        if motion >= SPHERICAL:
-            i += 3 if motion == FREE else 0
+        motion, i = nodes[n, node.MOTION], nodes[n, node.COORDINATE]
+        if motion >= node.SPHERICAL:
+            i += 3 if motion == node.FREE else 0
             e0, e1, e2, e3 = y[i], y[i + 1], y[i + 2], y[i + 3]
             h = 1.0 / np.sqrt(e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3)
             y[i], y[i + 1], y[i + 2], y[i + 3] = e0 * h, e1 * h, e2 * h, e3 * h

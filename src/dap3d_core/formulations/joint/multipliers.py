@@ -9,15 +9,7 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.metric import in_body_axes, scaled
-from dap3d_core.formulations.joint.node_layout import (
-    CHILD,
-    CHILD_BLOCK,
-    FIRST_ROW,
-    JOINT_PARENT,
-    JOINT_WIDTH,
-    PARENT_BLOCK,
-    ROW_COUNT,
-)
+from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
@@ -45,9 +37,13 @@ def joint_multipliers(system: System, left: Floats) -> None:
     joints, D, x = pointer(system.tree.joints), pointer(system.D), pointer(system.multipliers)
     work, rest = system.tree.scratch, system.tree.scratch[42:]
     for q in range(system.tree.joints.shape[0]):
-        j = JOINT_WIDTH * q
-        rows, first, child = joints[j + ROW_COUNT], joints[j + FIRST_ROW], joints[j + CHILD]
-        block = joints[j + CHILD_BLOCK]
+        j = node.JOINT_WIDTH * q
+        rows, first, child = (
+            joints[j + node.ROW_COUNT],
+            joints[j + node.FIRST_ROW],
+            joints[j + node.CHILD],
+        )
+        block = joints[j + node.CHILD_BLOCK]
         factor_products(D, block, rows, work)
         for c in range(6):
             rest[c] = left[child + c]
@@ -61,8 +57,8 @@ def joint_multipliers(system: System, left: Floats) -> None:
                 x[first + r] -= work[36 + r]
                 for c in range(6):
                     rest[c] -= D[block + 6 * r + c] * work[36 + r]
-        if joints[j + JOINT_PARENT] > 0:
-            parent, block = joints[j + JOINT_PARENT], joints[j + PARENT_BLOCK]
+        if joints[j + node.JOINT_PARENT] > 0:
+            parent, block = joints[j + node.JOINT_PARENT], joints[j + node.PARENT_BLOCK]
             for r in range(rows):
                 for c in range(6):
                     left[parent + c] += D[block + 6 * r + c] * x[first + r]

@@ -9,38 +9,8 @@ from typing import Any
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.evaluate import place_states
 from dap3d_core.assembly.metric import orient_by_state, put_rotation, square_of
+from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.formulations.joint.half_angles import half_angles
-from dap3d_core.formulations.joint.node_layout import (
-    ACCELERATION,
-    ALPHA,
-    AXIS,
-    AXIS_NOW,
-    CENTRE,
-    CENTRE_NOW,
-    CONSTANT_WIDTH,
-    COORDINATE,
-    FLAGS,
-    FREE,
-    HAS_MASS,
-    LINK,
-    LINK_NOW,
-    MOTION,
-    OWN_W,
-    PARENT,
-    PARENT_ROW,
-    POINT,
-    PRISMATIC,
-    RATE,
-    REVOLUTE,
-    ROW,
-    SPHERICAL,
-    SPIN,
-    TREE_WIDTH,
-    TURN,
-    TURN_SIN,
-    VELOCITY,
-    WORK_WIDTH,
-)
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A, P, R, V, W
@@ -100,48 +70,52 @@ def place_nodes(y: Floats, system: System) -> None:
     K, C = pointer(system.tree.work), pointer(system.tree.constants)
     sines, cosines = system.tree.half_angles[0], system.tree.half_angles[1]
     for n in range(1, system.tree.nodes.shape[0]):
-        t = TREE_WIDTH * n
+        t = node.TREE_WIDTH * n
         o, up, motion = (
-            BODY_WIDTH * tree[t + ROW],
-            BODY_WIDTH * tree[t + PARENT_ROW],
-            tree[t + MOTION],
+            BODY_WIDTH * tree[t + node.ROW],
+            BODY_WIDTH * tree[t + node.PARENT_ROW],
+            tree[t + node.MOTION],
         )
-        k, m, c = WORK_WIDTH * n, WORK_WIDTH * tree[t + PARENT], CONSTANT_WIDTH * n
-        i, j = tree[t + COORDINATE], tree[t + RATE]
-        if motion == REVOLUTE:
+        k, m, c = (
+            node.WORK_WIDTH * n,
+            node.WORK_WIDTH * tree[t + node.PARENT],
+            node.CONSTANT_WIDTH * n,
+        )
+        i, j = tree[t + node.COORDINATE], tree[t + node.RATE]
+        if motion == node.REVOLUTE:
             orient(b, o, relative(b, up, turn(C, c, sines[i], cosines[i])))
             w, alpha = revolve(y[j], b, up, K, k, m, C, c)
             link(b, up, K, k, m, C, c)
-        elif motion == SPHERICAL:
+        elif motion == node.SPHERICAL:
             orient_by_state(b, o, (y[i], y[i + 1], y[i + 2], y[i + 3]))
             w, alpha = turn_freely(vector_of(y, j), b, o, K, k), (0.0, 0.0, 0.0)
             link(b, up, K, k, m, C, c)
-        elif motion == FREE:
+        elif motion == node.FREE:
             orient_by_state(b, o, (y[i + 3], y[i + 4], y[i + 5], y[i + 6]))
             w, alpha = turn_freely(vector_of(y, j + 3), b, o, K, k), (0.0, 0.0, 0.0)
-            put(K, k + POINT, vector_of(y, i))
-            put(K, k + VELOCITY, vector_of(y, j))
-            put(K, k + ACCELERATION, alpha)
+            put(K, k + node.POINT, vector_of(y, i))
+            put(K, k + node.VELOCITY, vector_of(y, j))
+            put(K, k + node.ACCELERATION, alpha)
         else:
             orient(b, o, relative(b, up, (C[c], C[c + 1], C[c + 2], C[c + 3])))
-            w, alpha = vector_of(b, up + W), vector_of(K, m + ALPHA)
+            w, alpha = vector_of(b, up + W), vector_of(K, m + node.ALPHA)
             link(b, up, K, k, m, C, c)
-            if motion == PRISMATIC:
+            if motion == node.PRISMATIC:
                 slide(y[i], y[j], b, up, K, k, m, C, c)
-        put(K, k + ALPHA, alpha)
-        spin(K, k + SPIN, w, alpha)
+        put(K, k + node.ALPHA, alpha)
+        spin(K, k + node.SPIN, w, alpha)
         put(b, o + W, w)
-        if tree[t + FLAGS] & HAS_MASS != 0:
-            s = times(b, o + A, vector_of(C, c + CENTRE))
-            put(K, k + CENTRE_NOW, s)
-            put(b, o + R, add(vector_of(K, k + POINT), s))
-            put(b, o + V, add(vector_of(K, k + VELOCITY), cross(w, s)))
+        if tree[t + node.FLAGS] & node.HAS_MASS != 0:
+            s = times(b, o + A, vector_of(C, c + node.CENTRE))
+            put(K, k + node.CENTRE_NOW, s)
+            put(b, o + R, add(vector_of(K, k + node.POINT), s))
+            put(b, o + V, add(vector_of(K, k + node.VELOCITY), cross(w, s)))
 
 
 @compiled_into
 def turn(C: Floats, c: int, s: float, h: float) -> Any:
     """Euler parameters of a revolute motion relative to the parent; s, h: sine, cosine of q/2."""
-    c, d = c + TURN, c + TURN_SIN
+    c, d = c + node.TURN, c + node.TURN_SIN
     return (
         C[c] * h + C[d] * s,
         C[c + 1] * h + C[d + 1] * s,
@@ -174,27 +148,33 @@ def orient(b: Floats, o: int, e: Any) -> None:
 @compiled_into
 def revolve(rate: float, b: Floats, up: int, K: Floats, k: int, m: int, C: Floats, c: int) -> Any:
     """Angular velocity and, without q_ddot, acceleration of a revolute node; sets its axis."""
-    axis = times(b, up + A, vector_of(C, c + AXIS))
-    put(K, k + AXIS_NOW, axis)
+    axis = times(b, up + A, vector_of(C, c + node.AXIS))
+    put(K, k + node.AXIS_NOW, axis)
     w, relative_w = vector_of(b, up + W), scale(rate, axis)
-    return add(w, relative_w), add(vector_of(K, m + ALPHA), cross(w, relative_w))
+    return add(w, relative_w), add(vector_of(K, m + node.ALPHA), cross(w, relative_w))
 
 
 @compiled_into
 def turn_freely(own: Vector, b: Floats, o: int, K: Floats, k: int) -> Vector:
     """Angular velocity of a ball or free body, global axes; stores omega', which is given."""
-    put(K, k + OWN_W, own)
+    put(K, k + node.OWN_W, own)
     return times(b, o + A, own)
 
 
 @compiled_into
 def link(b: Floats, up: int, K: Floats, k: int, m: int, C: Floats, c: int) -> None:
     """P of a node, its velocity and acceleration as a point of the parent."""
-    arm = times(b, up + A, vector_of(C, c + LINK))
-    put(K, k + LINK_NOW, arm)
-    put(K, k + POINT, add(vector_of(K, m + POINT), arm))
-    put(K, k + VELOCITY, add(vector_of(K, m + VELOCITY), cross(vector_of(b, up + W), arm)))
-    put(K, k + ACCELERATION, add(vector_of(K, m + ACCELERATION), times(K, m + SPIN, arm)))
+    arm = times(b, up + A, vector_of(C, c + node.LINK))
+    put(K, k + node.LINK_NOW, arm)
+    put(K, k + node.POINT, add(vector_of(K, m + node.POINT), arm))
+    put(
+        K, k + node.VELOCITY, add(vector_of(K, m + node.VELOCITY), cross(vector_of(b, up + W), arm))
+    )
+    put(
+        K,
+        k + node.ACCELERATION,
+        add(vector_of(K, m + node.ACCELERATION), times(K, m + node.SPIN, arm)),
+    )
 
 
 @compiled_into
@@ -202,15 +182,15 @@ def slide(
     q: float, rate: float, b: Floats, up: int, K: Floats, k: int, m: int, C: Floats, c: int
 ) -> None:
     """Move P of a prismatic node along the parent's axis."""
-    axis, w = times(b, up + A, vector_of(C, c + AXIS)), vector_of(b, up + W)
+    axis, w = times(b, up + A, vector_of(C, c + node.AXIS)), vector_of(b, up + W)
     way, turned = scale(q, axis), cross(w, axis)
-    put(K, k + AXIS_NOW, axis)
-    put(K, k + LINK_NOW, add(vector_of(K, k + LINK_NOW), way))
-    put(K, k + POINT, add(vector_of(K, k + POINT), way))
+    put(K, k + node.AXIS_NOW, axis)
+    put(K, k + node.LINK_NOW, add(vector_of(K, k + node.LINK_NOW), way))
+    put(K, k + node.POINT, add(vector_of(K, k + node.POINT), way))
     change = add(scale(q, turned), scale(rate, axis))
-    put(K, k + VELOCITY, add(vector_of(K, k + VELOCITY), change))
-    change = add(times(K, m + SPIN, way), scale(2.0 * rate, turned))
-    put(K, k + ACCELERATION, add(vector_of(K, k + ACCELERATION), change))
+    put(K, k + node.VELOCITY, add(vector_of(K, k + node.VELOCITY), change))
+    change = add(times(K, m + node.SPIN, way), scale(2.0 * rate, turned))
+    put(K, k + node.ACCELERATION, add(vector_of(K, k + node.ACCELERATION), change))
 
 
 @compiled_into

@@ -12,44 +12,7 @@ from typing import Any
 
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.metric import gyroscopic_moment
-from dap3d_core.formulations.joint.node_layout import (
-    ACCELERATION,
-    ALPHA,
-    AXIS_NOW,
-    CENTRE,
-    CENTRE_NOW,
-    CONSTANT_WIDTH,
-    FACTORS_BALL,
-    FACTORS_FREE,
-    FLAGS,
-    FORCE,
-    FREE,
-    FREE_RATE,
-    GAIN,
-    HAS_CHILDREN,
-    HAS_MASS,
-    INERTIA,
-    INVERSE,
-    IS_ALONE,
-    IS_FIRST,
-    LINK_NOW,
-    MASS,
-    MATRIX_H,
-    MATRIX_J,
-    MATRIX_M,
-    MOMENT,
-    MOTION,
-    OWN_W,
-    PARENT,
-    PRISMATIC,
-    REVOLUTE,
-    ROW,
-    SPHERICAL,
-    SPIN,
-    TREE_WIDTH,
-    VELOCITY,
-    WORK_WIDTH,
-)
+from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.formulations.joint.place import in_node_axes, put, times, vector_of
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
@@ -80,48 +43,48 @@ def reduce_nodes(system: System, forces: Floats, keeps: bool) -> float:
     K, C, F = pointer(system.tree.work), pointer(system.tree.constants), pointer(forces)
     power = 0.0
     for n in range(system.tree.nodes.shape[0] - 1, 0, -1):
-        t, k, c = TREE_WIDTH * n, WORK_WIDTH * n, CONSTANT_WIDTH * n
-        motion, flags, row = tree[t + MOTION], tree[t + FLAGS], tree[t + ROW]
+        t, k, c = node.TREE_WIDTH * n, node.WORK_WIDTH * n, node.CONSTANT_WIDTH * n
+        motion, flags, row = tree[t + node.MOTION], tree[t + node.FLAGS], tree[t + node.ROW]
         M, H, J, moment, force = NO_INERTIA, NO_MATRIX, NO_INERTIA, NOTHING, NOTHING
-        if flags & HAS_MASS != 0:
+        if flags & node.HAS_MASS != 0:
             o, f, couple = BODY_WIDTH * row, vector_of(F, 6 * row), vector_of(F, 6 * row + 3)
-            if flags & IS_ALONE != 0:
+            if flags & node.IS_ALONE != 0:
                 power += accelerate_alone(motion, b, o, C, c, K, k, f, couple)
                 continue
             w = vector_of(b, o + W)
             power += dot(f, vector_of(b, o + V)) + dot(couple, w)
             J = own_inertia(b, o, C, c)
-            M, H = own_mass(C[c + MASS], vector_of(K, k + CENTRE_NOW))
-            moment, force = missing(J, C[c + MASS], w, K, k, f, couple)
-            if motion < SPHERICAL:
-                moment = sub(moment, symmetric_times(J, vector_of(K, k + ALPHA)))
-        if flags & HAS_CHILDREN != 0:
-            M, H = add_own_mass(M, H, six_of(K, k + MATRIX_M), nine_of(K, k + MATRIX_H))
-            J = sum6(J, six_of(K, k + MATRIX_J))
-            moment = add(moment, vector_of(K, k + MOMENT))
-            force = add(force, vector_of(K, k + FORCE))
-        m, is_first = WORK_WIDTH * tree[t + PARENT], flags & IS_FIRST != 0
-        arm = vector_of(K, k + LINK_NOW)
-        if motion == REVOLUTE:
+            M, H = own_mass(C[c + node.MASS], vector_of(K, k + node.CENTRE_NOW))
+            moment, force = missing(J, C[c + node.MASS], w, K, k, f, couple)
+            if motion < node.SPHERICAL:
+                moment = sub(moment, symmetric_times(J, vector_of(K, k + node.ALPHA)))
+        if flags & node.HAS_CHILDREN != 0:
+            M, H = add_own_mass(M, H, six_of(K, k + node.MATRIX_M), nine_of(K, k + node.MATRIX_H))
+            J = sum6(J, six_of(K, k + node.MATRIX_J))
+            moment = add(moment, vector_of(K, k + node.MOMENT))
+            force = add(force, vector_of(K, k + node.FORCE))
+        m, is_first = node.WORK_WIDTH * tree[t + node.PARENT], flags & node.IS_FIRST != 0
+        arm = vector_of(K, k + node.LINK_NOW)
+        if motion == node.REVOLUTE:
             M, H, J, moment, force = release_turn(K, k, M, H, J, moment, force, keeps)
             if m != 0:
                 H, J, moment = carry(arm, M, H, J, moment, force)
                 add_to_parent(K, m, is_first, M, H, J, moment, force)
-        elif motion == SPHERICAL:
+        elif motion == node.SPHERICAL:
             if keeps:
-                put_six(K, k + FACTORS_BALL, factors_of(J))
+                put_six(K, k + node.FACTORS_BALL, factors_of(J))
             M, force = release_rotation(K, k, M, H, J, moment, force)
             if m != 0:
                 H, J, moment = carry_ball(arm, M, force)
                 add_to_parent(K, m, is_first, M, H, J, moment, force)
-        elif motion == FREE:
+        elif motion == node.FREE:
             if keeps:
-                put_six(K, k + FACTORS_FREE, factors_of(J))
+                put_six(K, k + node.FACTORS_FREE, factors_of(J))
             M, force = release_rotation(K, k, M, H, J, moment, force)
-            put_six(K, k + MATRIX_M, M)
-            put(K, k + FORCE, force)
+            put_six(K, k + node.MATRIX_M, M)
+            put(K, k + node.FORCE, force)
         else:
-            if motion == PRISMATIC:
+            if motion == node.PRISMATIC:
                 M, H, J, moment, force = release_slide(K, k, M, H, J, moment, force, keeps)
             if m != 0:
                 H, J, moment = carry(arm, M, H, J, moment, force)
@@ -135,7 +98,7 @@ def own_inertia(b: Floats, o: int, C: Floats, c: int) -> Symmetric:
     a00, a01, a02 = vector_of(b, o + A)
     a10, a11, a12 = vector_of(b, o + A + 3)
     a20, a21, a22 = vector_of(b, o + A + 6)
-    j00, j01, j02, j11, j12, j22 = six_of(C, c + INERTIA)
+    j00, j01, j02, j11, j12, j22 = six_of(C, c + node.INERTIA)
     x0, x1, x2 = (
         a00 * j00 + a01 * j01 + a02 * j02,
         a00 * j01 + a01 * j11 + a02 * j12,
@@ -184,8 +147,8 @@ def missing(J: Symmetric, mass: float, w: Vector, K: Floats, k: int, f: Vector, 
 
     The moment is without J alpha, which is zero where the state has angular velocities as such.
     """
-    s, a = vector_of(K, k + CENTRE_NOW), vector_of(K, k + ACCELERATION)
-    centre = add(a, times(K, k + SPIN, s))
+    s, a = vector_of(K, k + node.CENTRE_NOW), vector_of(K, k + node.ACCELERATION)
+    centre = add(a, times(K, k + node.SPIN, s))
     moment = add(n, cross(s, sub(f, scale(mass, a))))
     return sub(moment, cross(w, symmetric_times(J, w))), sub(f, scale(mass, centre))
 
@@ -199,22 +162,22 @@ def accelerate_alone(
     Returns the power of its forces, by moments about P: ground has none of it. What only turns is
     taken in the body's axes, where its velocities and moments of inertia are.
     """
-    J = six_of(C, c + INERTIA)
-    if motion >= SPHERICAL:
-        w = vector_of(K, k + OWN_W)
-        moment = cross(vector_of(C, c + CENTRE), in_node_axes(b, o, f))
+    J = six_of(C, c + node.INERTIA)
+    if motion >= node.SPHERICAL:
+        w = vector_of(K, k + node.OWN_W)
+        moment = cross(vector_of(C, c + node.CENTRE), in_node_axes(b, o, f))
         moment = add(in_node_axes(b, o, n), moment)
         lacking = sub(moment, gyroscopic_moment(J, w))
-        put(K, k + MOMENT, solve_factored(factors_of(J), lacking))
-        put(K, k + FORCE, scale(1.0 / C[c + MASS], f))
-        return dot(moment, w) + dot(f, vector_of(K, k + VELOCITY))
-    if motion == REVOLUTE:
-        axis = vector_of(K, k + AXIS_NOW)
+        put(K, k + node.MOMENT, solve_factored(factors_of(J), lacking))
+        put(K, k + node.FORCE, scale(1.0 / C[c + node.MASS], f))
+        return dot(moment, w) + dot(f, vector_of(K, k + node.VELOCITY))
+    if motion == node.REVOLUTE:
+        axis = vector_of(K, k + node.AXIS_NOW)
         own = in_node_axes(b, o, axis)
-        lack = dot(axis, add(n, cross(vector_of(K, k + CENTRE_NOW), f)))
-        K[k + FREE_RATE] = lack * (1.0 / dot(own, symmetric_times(J, own)))
-    elif motion == PRISMATIC:
-        K[k + FREE_RATE] = dot(vector_of(K, k + AXIS_NOW), f) * (1.0 / C[c + MASS])
+        lack = dot(axis, add(n, cross(vector_of(K, k + node.CENTRE_NOW), f)))
+        K[k + node.FREE_RATE] = lack * (1.0 / dot(own, symmetric_times(J, own)))
+    elif motion == node.PRISMATIC:
+        K[k + node.FREE_RATE] = dot(vector_of(K, k + node.AXIS_NOW), f) * (1.0 / C[c + node.MASS])
     return dot(f, vector_of(b, o + V)) + dot(n, vector_of(b, o + W))
 
 
@@ -224,7 +187,7 @@ def release_turn(
     keeps: bool,
 ) -> Any:  # fmt: skip
     """Eliminate a rotation about an axis through P."""
-    axis = vector_of(K, k + AXIS_NOW)
+    axis = vector_of(K, k + node.AXIS_NOW)
     u, v = symmetric_times(J, axis), transposed_times(H, axis)
     d, lack = dot(axis, u), dot(axis, moment)
     return release(K, k, u, v, d, lack, M, H, J, moment, force, keeps)
@@ -236,7 +199,7 @@ def release_slide(
     keeps: bool,
 ) -> Any:  # fmt: skip
     """Eliminate a translation along an axis."""
-    axis = vector_of(K, k + AXIS_NOW)
+    axis = vector_of(K, k + node.AXIS_NOW)
     u, v = matrix_times(H, axis), symmetric_times(M, axis)
     d, lack = dot(axis, v), dot(axis, force)
     return release(K, k, u, v, d, lack, M, H, J, moment, force, keeps)
@@ -251,11 +214,11 @@ def release(
     part = 1.0 / d
     rate = lack * part
     g, h = scale(part, u), scale(part, v)
-    put(K, k + GAIN, g)
-    put(K, k + GAIN + 3, h)
-    K[k + FREE_RATE] = rate
+    put(K, k + node.GAIN, g)
+    put(K, k + node.GAIN + 3, h)
+    K[k + node.FREE_RATE] = rate
     if keeps:
-        K[k + INVERSE] = part
+        K[k + node.INVERSE] = part
     J = (J[0] - u[0] * g[0], J[1] - u[0] * g[1], J[2] - u[0] * g[2],
          J[3] - u[1] * g[1], J[4] - u[1] * g[2], J[5] - u[2] * g[2])  # fmt: skip
     H = (H[0] - u[0] * h[0], H[1] - u[0] * h[1], H[2] - u[0] * h[2],
@@ -276,10 +239,10 @@ def release_rotation(
     y = solve_factored(L, (H[1], H[4], H[7]))
     z = solve_factored(L, (H[2], H[5], H[8]))
     rate = solve_factored(L, moment)
-    put(K, k + MATRIX_H, (x[0], y[0], z[0]))
-    put(K, k + MATRIX_H + 3, (x[1], y[1], z[1]))
-    put(K, k + MATRIX_H + 6, (x[2], y[2], z[2]))
-    put(K, k + MOMENT, rate)
+    put(K, k + node.MATRIX_H, (x[0], y[0], z[0]))
+    put(K, k + node.MATRIX_H + 3, (x[1], y[1], z[1]))
+    put(K, k + node.MATRIX_H + 6, (x[2], y[2], z[2]))
+    put(K, k + node.MOMENT, rate)
     M = (
         M[0] - (H[0] * x[0] + H[3] * x[1] + H[6] * x[2]),
         M[1] - (H[0] * y[0] + H[3] * y[1] + H[6] * y[2]),
@@ -363,17 +326,17 @@ def add_to_parent(
 ) -> None:
     """Add what a node leaves to its parent's share of ``tree.work``; the first one stores it."""
     if not is_first:
-        M = sum6(M, six_of(K, m + MATRIX_M))
-        H = sum9(H, nine_of(K, m + MATRIX_H))
-        J = sum6(J, six_of(K, m + MATRIX_J))
-        n, f = add(n, vector_of(K, m + MOMENT)), add(f, vector_of(K, m + FORCE))
-    put_six(K, m + MATRIX_M, M)
-    put(K, m + MATRIX_H, (H[0], H[1], H[2]))
-    put(K, m + MATRIX_H + 3, (H[3], H[4], H[5]))
-    put(K, m + MATRIX_H + 6, (H[6], H[7], H[8]))
-    put_six(K, m + MATRIX_J, J)
-    put(K, m + MOMENT, n)
-    put(K, m + FORCE, f)
+        M = sum6(M, six_of(K, m + node.MATRIX_M))
+        H = sum9(H, nine_of(K, m + node.MATRIX_H))
+        J = sum6(J, six_of(K, m + node.MATRIX_J))
+        n, f = add(n, vector_of(K, m + node.MOMENT)), add(f, vector_of(K, m + node.FORCE))
+    put_six(K, m + node.MATRIX_M, M)
+    put(K, m + node.MATRIX_H, (H[0], H[1], H[2]))
+    put(K, m + node.MATRIX_H + 3, (H[3], H[4], H[5]))
+    put(K, m + node.MATRIX_H + 6, (H[6], H[7], H[8]))
+    put_six(K, m + node.MATRIX_J, J)
+    put(K, m + node.MOMENT, n)
+    put(K, m + node.FORCE, f)
 
 
 @compiled_into

@@ -4,36 +4,7 @@ Featherstone, Rigid Body Dynamics Algorithms (2008), 7.3.
 """
 
 from dap3d_core.assembly.arrays import Floats, System
-from dap3d_core.formulations.joint.node_layout import (
-    ACCELERATION,
-    ACCELERATION_Q,
-    ALPHA,
-    ALPHA_Q,
-    AXIS_NOW,
-    CENTRE_NOW,
-    COORDINATE,
-    FIXED,
-    FLAGS,
-    FORCE,
-    FREE,
-    FREE_RATE,
-    GAIN,
-    HAS_MASS,
-    IS_ALONE,
-    LINK_NOW,
-    MATRIX_H,
-    MATRIX_M,
-    MOMENT,
-    MOTION,
-    PARENT,
-    RATE,
-    REVOLUTE,
-    ROW,
-    SPHERICAL,
-    SPIN,
-    TREE_WIDTH,
-    WORK_WIDTH,
-)
+from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.formulations.joint.place import Vector, in_node_axes, put, times, vector_of
 from dap3d_core.formulations.joint.reduce import factors_of, six_of, solve_factored
 from dap3d_core.kernels.runtime.array_struct import pointer
@@ -47,39 +18,45 @@ def spread_tree(y: Floats, out: Floats, system: System) -> None:
     """dy/dt but for the work; the part of all accelerations by q_ddot into ``tree.work``."""
     tree, b, K = pointer(system.tree.nodes), pointer(system.tree.places), pointer(system.tree.work)
     for n in range(1, system.tree.nodes.shape[0]):
-        t, k = TREE_WIDTH * n, WORK_WIDTH * n
-        m, motion, o = WORK_WIDTH * tree[t + PARENT], tree[t + MOTION], BODY_WIDTH * tree[t + ROW]
-        i, j = tree[t + COORDINATE], tree[t + RATE]
-        alpha = vector_of(K, m + ALPHA_Q)
-        a = add(vector_of(K, m + ACCELERATION_Q), cross(alpha, vector_of(K, k + LINK_NOW)))
-        is_alone = tree[t + FLAGS] & IS_ALONE != 0
-        if motion == FREE:
-            a = vector_of(K, k + FORCE)
+        t, k = node.TREE_WIDTH * n, node.WORK_WIDTH * n
+        m, motion, o = (
+            node.WORK_WIDTH * tree[t + node.PARENT],
+            tree[t + node.MOTION],
+            BODY_WIDTH * tree[t + node.ROW],
+        )
+        i, j = tree[t + node.COORDINATE], tree[t + node.RATE]
+        alpha = vector_of(K, m + node.ALPHA_Q)
+        a = add(
+            vector_of(K, m + node.ACCELERATION_Q), cross(alpha, vector_of(K, k + node.LINK_NOW))
+        )
+        is_alone = tree[t + node.FLAGS] & node.IS_ALONE != 0
+        if motion == node.FREE:
+            a = vector_of(K, k + node.FORCE)
             if not is_alone:
-                a = solve_factored(factors_of(six_of(K, k + MATRIX_M)), a)
+                a = solve_factored(factors_of(six_of(K, k + node.MATRIX_M)), a)
             put(out, i, vector_of(y, j))
             put(out, j, a)
             i, j = i + 3, j + 3
-        if motion >= SPHERICAL:
+        if motion >= node.SPHERICAL:
             if is_alone:
-                own = vector_of(K, k + MOMENT)
+                own = vector_of(K, k + node.MOMENT)
                 alpha = times(b, o + A, own)
             else:
-                alpha = sub(vector_of(K, k + MOMENT), times(K, k + MATRIX_H, a))
+                alpha = sub(vector_of(K, k + node.MOMENT), times(K, k + node.MATRIX_H, a))
                 own = in_node_axes(b, o, alpha)
             turn_parameters(y, i, vector_of(y, j), out)
             put(out, j, own)
-        elif motion != FIXED:
-            rate = K[k + FREE_RATE] - dot(vector_of(K, k + GAIN), alpha)
-            rate -= dot(vector_of(K, k + GAIN + 3), a)
-            change = scale(rate, vector_of(K, k + AXIS_NOW))
-            if motion == REVOLUTE:
+        elif motion != node.FIXED:
+            rate = K[k + node.FREE_RATE] - dot(vector_of(K, k + node.GAIN), alpha)
+            rate -= dot(vector_of(K, k + node.GAIN + 3), a)
+            change = scale(rate, vector_of(K, k + node.AXIS_NOW))
+            if motion == node.REVOLUTE:
                 alpha = add(alpha, change)
             else:
                 a = add(a, change)
             out[i], out[j] = y[j], rate
-        put(K, k + ALPHA_Q, alpha)
-        put(K, k + ACCELERATION_Q, a)
+        put(K, k + node.ALPHA_Q, alpha)
+        put(K, k + node.ACCELERATION_Q, a)
 
 
 @compiled_into
@@ -98,10 +75,10 @@ def body_accelerations(system: System, out: Floats) -> None:
     """Accelerations (6 n,) of the bodies: r_ddot and omega_dot, global axes."""
     tree, K = pointer(system.tree.nodes), pointer(system.tree.work)
     for n in range(1, system.tree.nodes.shape[0]):
-        t, k = TREE_WIDTH * n, WORK_WIDTH * n
-        if tree[t + FLAGS] & HAS_MASS != 0:
-            o, s = 6 * (tree[t + ROW] - 1), vector_of(K, k + CENTRE_NOW)
-            alpha, a = vector_of(K, k + ALPHA_Q), vector_of(K, k + ACCELERATION_Q)
-            own = add(vector_of(K, k + ACCELERATION), times(K, k + SPIN, s))
+        t, k = node.TREE_WIDTH * n, node.WORK_WIDTH * n
+        if tree[t + node.FLAGS] & node.HAS_MASS != 0:
+            o, s = 6 * (tree[t + node.ROW] - 1), vector_of(K, k + node.CENTRE_NOW)
+            alpha, a = vector_of(K, k + node.ALPHA_Q), vector_of(K, k + node.ACCELERATION_Q)
+            own = add(vector_of(K, k + node.ACCELERATION), times(K, k + node.SPIN, s))
             put(out, o, add(own, add(a, cross(alpha, s))))
-            put(out, o + 3, add(vector_of(K, k + ALPHA), alpha))
+            put(out, o + 3, add(vector_of(K, k + node.ALPHA), alpha))

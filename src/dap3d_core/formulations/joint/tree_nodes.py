@@ -19,32 +19,7 @@ from dap3d_core.assembly.motion.joint_motion import (
     JointMotions,
     ModelMotions,
 )
-from dap3d_core.formulations.joint.node_layout import (
-    AXIS,
-    CENTRE,
-    CONSTANT_WIDTH,
-    COORDINATE,
-    FIXED,
-    FLAGS,
-    FREE,
-    HAS_CHILDREN,
-    HAS_MASS,
-    IS_ALONE,
-    IS_FIRST,
-    LINK,
-    MASS,
-    MOTION,
-    PARENT,
-    PARENT_ROW,
-    PRISMATIC,
-    RATE,
-    REVOLUTE,
-    ROW,
-    SPHERICAL,
-    TREE_WIDTH,
-    TURN,
-    TURN_SIN,
-)
+from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.linear.ordering.spanning_forest import SpanningForest
 from dap3d_core.model import Model
 from dap3d_core.model.rigid_motion import Pose, adjoint, quaternion_product, relative
@@ -52,13 +27,13 @@ from dap3d_core.model.rotations import to_body, to_global
 from dap3d_core.model.state_layout import Layout, split, tree_layout
 
 #: Motions of nodes by the kinds of elementary motions.
-MOTIONS = {ROTATION: REVOLUTE, TRANSLATION: PRISMATIC, BALL: SPHERICAL}
+MOTIONS = {ROTATION: node.REVOLUTE, TRANSLATION: node.PRISMATIC, BALL: node.SPHERICAL}
 #: Segments of the state by motion, with their rates, and entries of each.
 SEGMENTS = {
-    REVOLUTE: ("angles", "angle_rates", 1, 1),
-    PRISMATIC: ("lengths", "length_rates", 1, 1),
-    SPHERICAL: ("rotations", "rotation_rates", 4, 3),
-    FREE: ("poses", "pose_rates", 7, 6),
+    node.REVOLUTE: ("angles", "angle_rates", 1, 1),
+    node.PRISMATIC: ("lengths", "length_rates", 1, 1),
+    node.SPHERICAL: ("rotations", "rotation_rates", 4, 3),
+    node.FREE: ("poses", "pose_rates", 7, 6),
 }
 
 
@@ -129,7 +104,7 @@ def tree_nodes(
     last = np.cumsum(parts)  # node of each child; node 0 is ground
     first = last - parts + 1
     count = int(last[-1]) + 1
-    motion = np.full(count, FIXED, dtype=np.int64)
+    motion = np.full(count, node.FIXED, dtype=np.int64)
     groups = []
     for entries, moves, kinds, slot in chains:
         nodes = first[entries][:, None] + np.arange(len(kinds))
@@ -146,7 +121,7 @@ def tree_nodes(
     parent[0], parent[first] = 0, node_of_body[tree.parent]
     table = _table(motion, parent, body, body_count)
     layout = _place_coordinates(table, state_count)
-    return TreeNodes(table, tuple(groups), layout, int(table[:, ROW].max()) + 1, body, frame)
+    return TreeNodes(table, tuple(groups), layout, int(table[:, node.ROW].max()) + 1, body, frame)
 
 
 def _chains(
@@ -155,7 +130,7 @@ def _chains(
     """(entries, motions from parent to child, motions of the nodes, child's slot) of joints."""
     free = np.flatnonzero(tree.joint < 0)
     if free.size:
-        yield free, None, (FREE,), ""
+        yield free, None, (node.FREE,), ""
     entry_of = dict(zip(tree.joint.tolist(), range(len(tree.joint)), strict=True))
     for group in motions.motions:
         entries = np.array([entry_of.get(k, -1) for k in group.joints.tolist()])
@@ -164,35 +139,39 @@ def _chains(
             here = np.flatnonzero(mask)
             if here.size:
                 moves = group.take(here).reversed() if is_reversed else group.take(here)
-                kinds = tuple(MOTIONS[part.kind] for part in moves.parts) or (FIXED,)
+                kinds = tuple(MOTIONS[part.kind] for part in moves.parts) or (node.FIXED,)
                 yield entries[here], moves, kinds, moves.slots[0]
 
 
 def _table(motion: Integers, parent: Integers, body: Integers, body_count: int) -> Integers:
     """The table of nodes but for their places in the state."""
     count = len(motion)
-    table = np.zeros((count, TREE_WIDTH), dtype=np.int64)
+    table = np.zeros((count, node.TREE_WIDTH), dtype=np.int64)
     massless = body < 0
-    table[:, ROW] = np.where(massless, body_count + np.cumsum(massless), body)
-    table[:, PARENT], table[:, PARENT_ROW], table[:, MOTION] = parent, table[parent, ROW], motion
+    table[:, node.ROW] = np.where(massless, body_count + np.cumsum(massless), body)
+    table[:, node.PARENT], table[:, node.PARENT_ROW], table[:, node.MOTION] = (
+        parent,
+        table[parent, node.ROW],
+        motion,
+    )
     last_child = np.zeros(count, dtype=np.int64)
     np.maximum.at(last_child, parent[1:], np.arange(1, count))
-    table[:, FLAGS] = HAS_MASS * (body > 0) + HAS_CHILDREN * (last_child > 0)
-    table[last_child[last_child > 0], FLAGS] += IS_FIRST
+    table[:, node.FLAGS] = node.HAS_MASS * (body > 0) + node.HAS_CHILDREN * (last_child > 0)
+    table[last_child[last_child > 0], node.FLAGS] += node.IS_FIRST
     is_alone = (parent == 0) & (last_child == 0) & (body > 0)
-    table[is_alone, FLAGS] += IS_ALONE
+    table[is_alone, node.FLAGS] += node.IS_ALONE
     return table
 
 
 def _place_coordinates(table: Integers, state_count: int) -> Layout:
     """Give every node its places in the state; the layout of that."""
-    counts = [int(np.count_nonzero(table[1:, MOTION] == motion)) for motion in SEGMENTS]
+    counts = [int(np.count_nonzero(table[1:, node.MOTION] == motion)) for motion in SEGMENTS]
     layout = tree_layout(*counts, states=state_count)
     for motion, (segment, rates, size, rate_size) in SEGMENTS.items():
-        nodes = 1 + np.flatnonzero(table[1:, MOTION] == motion)
+        nodes = 1 + np.flatnonzero(table[1:, node.MOTION] == motion)
         order = np.arange(len(nodes))
-        table[nodes, COORDINATE] = layout[segment].start + size * order
-        table[nodes, RATE] = layout[rates].start + rate_size * order
+        table[nodes, node.COORDINATE] = layout[segment].start + size * order
+        table[nodes, node.RATE] = layout[rates].start + rate_size * order
     return layout
 
 
@@ -235,40 +214,42 @@ class Reference:
             if moves.parts[part].constant_in != group.child_slot:
                 twist = np.einsum("kab,kdb->kda", change, twist)
             turn, shift = twist[..., 3:], twist[..., :3]
-            if motion == PRISMATIC:
+            if motion == node.PRISMATIC:
                 self.axis[group.nodes[:, part]] = to_global(p, shift[:, 0])
                 continue
-            arm = np.sum(np.cross(turn, shift), axis=1) * (0.5 if motion == SPHERICAL else 1.0)
-            if motion == REVOLUTE:
+            arm = np.sum(np.cross(turn, shift), axis=1) * (0.5 if motion == node.SPHERICAL else 1.0)
+            if motion == node.REVOLUTE:
                 self.axis[group.nodes[:, part]] = to_global(p, turn[:, 0])
             self.point[group.nodes[:, part]] = r + to_global(p, arm)
         for part in range(len(group.motions) - 2, -1, -1):
-            if group.motions[part] == PRISMATIC:  # its point may be any
+            if group.motions[part] == node.PRISMATIC:  # its point may be any
                 self.point[group.nodes[:, part]] = self.point[group.nodes[:, part + 1]]
 
     def constants(self) -> Floats:
         """``TreeArrays.constants``."""
         table, body, model = self.nodes.table, self.nodes.body, self.model
-        parent, motion = table[:, PARENT], table[:, MOTION]
+        parent, motion = table[:, node.PARENT], table[:, node.MOTION]
         p, p_parent = self.p[self.nodes.frame], self.p[self.nodes.frame[parent]]
-        turning, sliding = motion == REVOLUTE, motion == PRISMATIC
-        constants = np.zeros((len(table), CONSTANT_WIDTH))
+        turning, sliding = motion == node.REVOLUTE, motion == node.PRISMATIC
+        constants = np.zeros((len(table), node.CONSTANT_WIDTH))
         turn = quaternion_product(p_parent * np.array([1.0, -1.0, -1.0, -1.0]), p)
         own_axis = to_body(p, self.axis)
         back = np.where(turning, -0.5 * ANGLE, 0.0)[:, None]
         turn = quaternion_product(turn, np.hstack([np.cos(back), np.sin(back) * own_axis]))
-        constants[:, TURN : TURN + 4] = turn
+        constants[:, node.TURN : node.TURN + 4] = turn
         no_scalar = np.hstack([np.zeros((len(table), 1)), own_axis])
-        constants[:, TURN_SIN : TURN_SIN + 4] = quaternion_product(turn, no_scalar)
-        axis = constants[:, AXIS : AXIS + 3] = to_body(p_parent, self.axis)
+        constants[:, node.TURN_SIN : node.TURN_SIN + 4] = quaternion_product(turn, no_scalar)
+        axis = constants[:, node.AXIS : node.AXIS + 3] = to_body(p_parent, self.axis)
         link = to_body(p_parent, self.point - self.point[parent])
         link -= np.where(sliding, model.part_size, 0.0)[:, None] * axis
-        constants[:, LINK : LINK + 3] = link
+        constants[:, node.LINK : node.LINK + 3] = link
         own = np.flatnonzero(body > 0)
         of = body[own]
         s = to_body(p[own], self.r[of] - self.point[own])
-        constants[own, CENTRE : CENTRE + 3] = s
-        constants[own, MASS : MASS + 7] = inertias_about(s, model.mass[of - 1], model.Jp[of - 1])
+        constants[own, node.CENTRE : node.CENTRE + 3] = s
+        constants[own, node.MASS : node.MASS + 7] = inertias_about(
+            s, model.mass[of - 1], model.Jp[of - 1]
+        )
         return constants.ravel()
 
     def state(self) -> Floats:
@@ -277,23 +258,23 @@ class Reference:
         With velocities (..., n + 1, 3) in ``v`` and ``w``, states (..., size).
         """
         table, y = self.nodes.table, np.zeros((*self.v.shape[:-2], self.nodes.layout.size))
-        motion = table[:, MOTION]
-        y[..., table[motion == REVOLUTE, COORDINATE]] = ANGLE
-        y[..., table[motion == PRISMATIC, COORDINATE]] = self.model.part_size
+        motion = table[:, node.MOTION]
+        y[..., table[motion == node.REVOLUTE, node.COORDINATE]] = ANGLE
+        y[..., table[motion == node.PRISMATIC, node.COORDINATE]] = self.model.part_size
         for group in self.nodes.groups:
             last, children = group.nodes[:, -1], group.children
-            coordinate, rate = table[last, COORDINATE], table[last, RATE]
+            coordinate, rate = table[last, node.COORDINATE], table[last, node.RATE]
             r, p = self.r[children], self.p[children]
             v, w = self.v[..., children, :], self.w[..., children, :]
-            if group.motions[-1] == FREE:
+            if group.motions[-1] == node.FREE:
                 y[..., coordinate[:, None] + np.arange(7)] = np.hstack([r, p])
                 moving = np.concatenate([v, to_body(p, w)], axis=-1)
                 y[..., rate[:, None] + np.arange(6)] = moving
-            elif group.motions[-1] == SPHERICAL:
+            elif group.motions[-1] == node.SPHERICAL:
                 y[..., coordinate[:, None] + np.arange(4)] = p
                 y[..., rate[:, None] + np.arange(3)] = to_body(p, w)
-            elif group.motions[-1] != FIXED:
-                y[..., table[group.nodes, RATE]] = self._rates(group)
+            elif group.motions[-1] != node.FIXED:
+                y[..., table[group.nodes, node.RATE]] = self._rates(group)
         return y
 
     def _rates(self, group: MotionGroup) -> Floats:
@@ -307,7 +288,7 @@ class Reference:
         for part, motion in enumerate(group.motions):
             nodes: Integers = group.nodes[:, part]
             axis = self.axis[nodes]
-            if motion == REVOLUTE:
+            if motion == node.REVOLUTE:
                 columns[:, 3:, part] = axis
                 columns[:, :3, part] = np.cross(axis, self.r[children] - self.point[nodes])
             else:

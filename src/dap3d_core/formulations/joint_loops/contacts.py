@@ -43,9 +43,8 @@ from dap3d_core.formulations.joint.equations import accepted, apply_forces, line
 from dap3d_core.formulations.joint.place import place_tree
 from dap3d_core.formulations.joint.reduce import reduce_nodes
 from dap3d_core.formulations.joint.spread import body_accelerations, spread_tree
-from dap3d_core.formulations.joint_loops import kept_rows
+from dap3d_core.formulations.joint_loops import kept_rows, layout
 from dap3d_core.formulations.joint_loops.equations import factorise, power_of_kept_drivers, solve
-from dap3d_core.formulations.joint_loops.layout import FIRST, FIRST_ROW, ROW_COUNT
 from dap3d_core.formulations.joint_loops.loads import (
     lacking_accelerations,
     linearise_kept,
@@ -175,8 +174,8 @@ def store_kept(system: System) -> None:
     """-lambda of the kept rows into ``multipliers``."""
     kept = system.tree.kept
     for q in range(kept.cuts.shape[0]):
-        first, place = kept.cuts[q, FIRST], kept.cuts[q, FIRST_ROW]
-        for r in range(kept.cuts[q, ROW_COUNT]):
+        first, place = kept.cuts[q, layout.FIRST], kept.cuts[q, layout.FIRST_ROW]
+        for r in range(kept.cuts[q, layout.ROW_COUNT]):
             system.multipliers[place + r] = -kept.multipliers[first + r]
 
 

@@ -30,19 +30,7 @@ from dap3d_core.formulations.joint.multipliers import joint_multipliers
 from dap3d_core.formulations.joint.place import place_tree
 from dap3d_core.formulations.joint.reduce import reduce_nodes
 from dap3d_core.formulations.joint.spread import body_accelerations, spread_tree
-from dap3d_core.formulations.joint_loops import kept_rows
-from dap3d_core.formulations.joint_loops.layout import (
-    CUT_WIDTH,
-    END_BLOCK,
-    END_BODY,
-    END_WIDTH,
-    FIRST,
-    FIRST_END,
-    FIRST_ROW,
-    LAST_END,
-    PART_OF_ROW,
-    ROW_COUNT,
-)
+from dap3d_core.formulations.joint_loops import kept_rows, layout
 from dap3d_core.formulations.joint_loops.loads import (
     carry_rows,
     lacking_accelerations,
@@ -85,7 +73,7 @@ def factorise(system: System) -> None:
     """Factors of the kept rows' matrix, of the inertias in ``tree.work``."""
     carry_rows(system)
     multiply_loads(system)
-    weigh_kept_rows(system, system.tree.kept.settings[PART_OF_ROW])
+    weigh_kept_rows(system, system.tree.kept.settings[layout.PART_OF_ROW])
     factor_profile(system)
 
 
@@ -121,7 +109,7 @@ def solve(system: System) -> None:
 @compiled
 def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Move a state onto the kept rows; out as in ``project_onto``, a length for each kept joint."""
-    is_redundant = system.tree.kept.settings[PART_OF_ROW] > 0.0
+    is_redundant = system.tree.kept.settings[layout.PART_OF_ROW] > 0.0
     project_onto(t, y, out, system, loops, kept_rows, None, is_redundant, True)
     if is_redundant and kept_rows.have_come_to_hold(system):
         out[1] = 1.0
@@ -139,7 +127,7 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
     body_accelerations(system, out)
     report_multipliers(system, out)
     report_levels(t, y, out, system, loops)
-    if system.tree.kept.settings[PART_OF_ROW] > 0.0:
+    if system.tree.kept.settings[layout.PART_OF_ROW] > 0.0:
         for _ in range(2):
             for k in range(system.total.shape[0]):
                 system.total[k] = system.multipliers[k]
@@ -156,14 +144,21 @@ def add_kept_reactions(system: System, left: Floats) -> None:
     kept = system.tree.kept
     cuts, ends, D = pointer(kept.cuts), pointer(kept.ends), pointer(system.D)
     for q in range(kept.cuts.shape[0]):
-        c = CUT_WIDTH * q
-        rows, first, place = cuts[c + ROW_COUNT], cuts[c + FIRST], cuts[c + FIRST_ROW]
+        c = layout.CUT_WIDTH * q
+        rows, first, place = (
+            cuts[c + layout.ROW_COUNT],
+            cuts[c + layout.FIRST],
+            cuts[c + layout.FIRST_ROW],
+        )
         for r in range(rows):
             system.multipliers[place + r] = -kept.multipliers[first + r]
-        for e in range(cuts[c + FIRST_END], cuts[c + LAST_END]):
-            b = 6 * ends[END_WIDTH * e + END_BODY]
+        for e in range(cuts[c + layout.FIRST_END], cuts[c + layout.LAST_END]):
+            b = 6 * ends[layout.END_WIDTH * e + layout.END_BODY]
             for r in range(rows):
-                d, x = ends[END_WIDTH * e + END_BLOCK] + 6 * r, kept.multipliers[first + r]
+                d, x = (
+                    ends[layout.END_WIDTH * e + layout.END_BLOCK] + 6 * r,
+                    kept.multipliers[first + r],
+                )
                 for i in range(6):
                     left[b + i] -= D[d + i] * x
 
@@ -173,7 +168,7 @@ def power_of_kept_drivers(system: System) -> float:
     """Power of the reactions of kept rows: only those that move do work."""
     kept, power = system.tree.kept, 0.0
     for q in range(kept.cuts.shape[0]):
-        first, place = kept.cuts[q, FIRST], kept.cuts[q, FIRST_ROW]
-        for r in range(kept.cuts[q, ROW_COUNT]):
+        first, place = kept.cuts[q, layout.FIRST], kept.cuts[q, layout.FIRST_ROW]
+        for r in range(kept.cuts[q, layout.ROW_COUNT]):
             power += kept.multipliers[first + r] * system.nu[place + r]
     return power

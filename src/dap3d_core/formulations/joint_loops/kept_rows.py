@@ -9,25 +9,12 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import LENGTH, VALUE, Floats, System
 from dap3d_core.assembly.evaluate import call_kinds, largest_weighted
+from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.formulations.joint.equations import normalise_rotations
-from dap3d_core.formulations.joint.node_layout import (
-    COORDINATE,
-    FIXED,
-    FREE,
-    MOTION,
-    RATE,
-    SPHERICAL,
-)
 from dap3d_core.formulations.joint.place import place_tree, put, vector_of
 from dap3d_core.formulations.joint.reduce import reduce_nodes
 from dap3d_core.formulations.joint.spread import spread_tree
-from dap3d_core.formulations.joint_loops.layout import (
-    FIRST,
-    FIRST_ROW,
-    PART_OF_ROW,
-    PLACE,
-    ROW_COUNT,
-)
+from dap3d_core.formulations.joint_loops import layout
 from dap3d_core.formulations.joint_loops.loads import (
     carry_rows,
     kept_residuals,
@@ -89,7 +76,7 @@ def factorise_anyway(system: System, part: float | None) -> bool:
     reduce_nodes(system, system.force, True)
     carry_rows(system)
     multiply_loads(system)
-    weigh_kept_rows(system, system.tree.kept.settings[PART_OF_ROW])
+    weigh_kept_rows(system, system.tree.kept.settings[layout.PART_OF_ROW])
     if factor_profile(system):
         return True
     multiply_loads(system)
@@ -149,12 +136,12 @@ def have_come_to_hold(system: System) -> bool:
     """
     kept = system.tree.kept
     for j in range(kept.profile.shape[0]):
-        kept.solution[j] = kept.matrix[kept.profile[j, PLACE] + j]
+        kept.solution[j] = kept.matrix[kept.profile[j, layout.PLACE] + j]
     multiply_loads(system)
-    weigh_kept_rows(system, kept.settings[PART_OF_ROW] / LESS)
+    weigh_kept_rows(system, kept.settings[layout.PART_OF_ROW] / LESS)
     factor_profile(system)
     for j in range(kept.profile.shape[0]):
-        inverse = kept.matrix[kept.profile[j, PLACE] + j]
+        inverse = kept.matrix[kept.profile[j, layout.PLACE] + j]
         if kept.smallest[j] == 0.0 and inverse < HELD * kept.solution[j]:
             return True
     return False
@@ -165,8 +152,8 @@ def aim_at_positions(system: System) -> None:
     """``right``: -C of the kept rows."""
     kept = system.tree.kept
     for q in range(kept.cuts.shape[0]):
-        first, place = kept.cuts[q, FIRST], kept.cuts[q, FIRST_ROW]
-        for r in range(kept.cuts[q, ROW_COUNT]):
+        first, place = kept.cuts[q, layout.FIRST], kept.cuts[q, layout.FIRST_ROW]
+        for r in range(kept.cuts[q, layout.ROW_COUNT]):
             kept.right[first + r] = -system.residual[place + r]
 
 
@@ -184,14 +171,14 @@ def add_displacement(y: Floats, change: Floats, system: System) -> None:
     """Change coordinates by a displacement, which stands among the rates of ``change``."""
     nodes = system.tree.nodes
     for n in range(1, nodes.shape[0]):
-        motion, i, j = nodes[n, MOTION], nodes[n, COORDINATE], nodes[n, RATE]
-        if motion == FREE:
+        motion, i, j = nodes[n, node.MOTION], nodes[n, node.COORDINATE], nodes[n, node.RATE]
+        if motion == node.FREE:
             for c in range(3):
                 y[i + c] += change[j + c]
             i, j = i + 3, j + 3
-        if motion >= SPHERICAL:
+        if motion >= node.SPHERICAL:
             turn_by(y, i, vector_of(change, j))
-        elif motion != FIXED:
+        elif motion != node.FIXED:
             y[i] += change[j]
 
 
@@ -212,9 +199,9 @@ def add_rates(y: Floats, change: Floats, system: System) -> None:
     """Add the rates of ``change`` to those of the state."""
     nodes = system.tree.nodes
     for n in range(1, nodes.shape[0]):
-        motion, j = nodes[n, MOTION], nodes[n, RATE]
-        count = 6 if motion == FREE else 3 if motion == SPHERICAL else 1
-        if motion != FIXED:
+        motion, j = nodes[n, node.MOTION], nodes[n, node.RATE]
+        count = 6 if motion == node.FREE else 3 if motion == node.SPHERICAL else 1
+        if motion != node.FIXED:
             for c in range(count):
                 y[j + c] += change[j + c]
 
@@ -224,8 +211,8 @@ def largest_lacking(system: System) -> float:
     """Largest of ``right``, m/s; NaN where one is NaN."""
     kept, worst = system.tree.kept, 0.0
     for q in range(kept.cuts.shape[0]):
-        first, place = kept.cuts[q, FIRST], kept.cuts[q, FIRST_ROW]
-        for r in range(kept.cuts[q, ROW_COUNT]):
+        first, place = kept.cuts[q, layout.FIRST], kept.cuts[q, layout.FIRST_ROW]
+        for r in range(kept.cuts[q, layout.ROW_COUNT]):
             size = abs(kept.right[first + r]) * system.weight[place + r]
             worst = where((size > worst) | (size != size), size, worst)
     return worst

@@ -14,30 +14,7 @@ from typing import Any
 
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.evaluate import zero
-from dap3d_core.formulations.joint.node_layout import ACCELERATION as POINT_ACCELERATION
-from dap3d_core.formulations.joint.node_layout import (
-    ALPHA,
-    AXIS_NOW,
-    CENTRE_NOW,
-    FACTORS_BALL,
-    FACTORS_FREE,
-    FORCE,
-    FREE,
-    FREE_RATE,
-    GAIN,
-    INVERSE,
-    LINK_NOW,
-    MATRIX_H,
-    MATRIX_M,
-    MOMENT,
-    MOTION,
-    PRISMATIC,
-    REVOLUTE,
-    SPHERICAL,
-    SPIN,
-    TREE_WIDTH,
-    WORK_WIDTH,
-)
+from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.formulations.joint.place import put, times, vector_of
 from dap3d_core.formulations.joint.reduce import (
     factors_of,
@@ -46,34 +23,7 @@ from dap3d_core.formulations.joint.reduce import (
     solve_factored,
     transposed_times,
 )
-from dap3d_core.formulations.joint_loops.layout import (
-    CUT_WIDTH,
-    END_BLOCK,
-    END_BODY,
-    END_STEP,
-    END_WIDTH,
-    FIRST,
-    FIRST_END,
-    FIRST_ROW,
-    FIRST_STEP,
-    LAST_END,
-    LAST_STEP,
-    LEFT,
-    LEFT_COUNT,
-    LEFT_LOADS,
-    LOADS,
-    NEXT_STEP,
-    NODE,
-    PAIR_NODE,
-    PAIR_WIDTH,
-    PLACE,
-    PROFILE_WIDTH,
-    RIGHT,
-    RIGHT_COUNT,
-    RIGHT_LOADS,
-    ROW_COUNT,
-    STEP_WIDTH,
-)
+from dap3d_core.formulations.joint_loops import layout
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, V, W
@@ -109,29 +59,34 @@ def carry_rows(system: System) -> None:
     D, g, x = pointer(kept.D), pointer(kept.loads), pointer(kept.carried)
     K, tree = pointer(system.tree.work), pointer(system.tree.nodes)
     for q in range(kept.cuts.shape[0]):
-        c = CUT_WIDTH * q
-        rows, first = cuts[c + ROW_COUNT], cuts[c + FIRST_STEP]
-        for i in range(6 * rows * (cuts[c + LAST_STEP] - first)):
+        c = layout.CUT_WIDTH * q
+        rows, first = cuts[c + layout.ROW_COUNT], cuts[c + layout.FIRST_STEP]
+        for i in range(6 * rows * (cuts[c + layout.LAST_STEP] - first)):
             x[i] = 0.0
-        for e in range(cuts[c + FIRST_END], cuts[c + LAST_END]):
-            step, block = ends[END_WIDTH * e + END_STEP], ends[END_WIDTH * e + END_BLOCK]
-            k = WORK_WIDTH * ways[STEP_WIDTH * step + NODE]
-            apply_rows(D, block, rows, vector_of(K, k + CENTRE_NOW), x, 6 * rows * (step - first))
-        for step in range(first, cuts[c + LAST_STEP]):
-            s = STEP_WIDTH * step
-            node, at = ways[s + NODE], 6 * rows * (step - first)
-            k, motion = WORK_WIDTH * node, tree[TREE_WIDTH * node + MOTION]
-            if motion == REVOLUTE:
-                pass_turn(K, k, rows, x, at, g, ways[s + LOADS])
-            elif motion == PRISMATIC:
-                pass_slide(K, k, rows, x, at, g, ways[s + LOADS])
-            elif motion == SPHERICAL:
-                pass_ball(K, k, rows, x, at, g, ways[s + LOADS], 3)
-            elif motion == FREE:
-                pass_ball(K, k, rows, x, at, g, ways[s + LOADS], 6)
-            if ways[s + NEXT_STEP] >= 0:
-                up = 6 * rows * (ways[s + NEXT_STEP] - first)
-                carry_on(vector_of(K, k + LINK_NOW), rows, x, at, up)
+        for e in range(cuts[c + layout.FIRST_END], cuts[c + layout.LAST_END]):
+            step, block = (
+                ends[layout.END_WIDTH * e + layout.END_STEP],
+                ends[layout.END_WIDTH * e + layout.END_BLOCK],
+            )
+            k = node.WORK_WIDTH * ways[layout.STEP_WIDTH * step + layout.NODE]
+            apply_rows(
+                D, block, rows, vector_of(K, k + node.CENTRE_NOW), x, 6 * rows * (step - first)
+            )
+        for step in range(first, cuts[c + layout.LAST_STEP]):
+            s = layout.STEP_WIDTH * step
+            n, at = ways[s + layout.NODE], 6 * rows * (step - first)
+            k, motion = node.WORK_WIDTH * n, tree[node.TREE_WIDTH * n + node.MOTION]
+            if motion == node.REVOLUTE:
+                pass_turn(K, k, rows, x, at, g, ways[s + layout.LOADS])
+            elif motion == node.PRISMATIC:
+                pass_slide(K, k, rows, x, at, g, ways[s + layout.LOADS])
+            elif motion == node.SPHERICAL:
+                pass_ball(K, k, rows, x, at, g, ways[s + layout.LOADS], 3)
+            elif motion == node.FREE:
+                pass_ball(K, k, rows, x, at, g, ways[s + layout.LOADS], 6)
+            if ways[s + layout.NEXT_STEP] >= 0:
+                up = 6 * rows * (ways[s + layout.NEXT_STEP] - first)
+                carry_on(vector_of(K, k + node.LINK_NOW), rows, x, at, up)
 
 
 @compiled_into
@@ -147,7 +102,11 @@ def apply_rows(D: Floats, block: int, rows: int, arm: Any, x: Floats, at: int) -
 @compiled_into
 def pass_turn(K: Floats, k: int, rows: int, x: Floats, at: int, g: Floats, place: int) -> None:
     """Take from loads what the freedom of a rotation takes."""
-    axis, u, v = vector_of(K, k + AXIS_NOW), vector_of(K, k + GAIN), vector_of(K, k + GAIN + 3)
+    axis, u, v = (
+        vector_of(K, k + node.AXIS_NOW),
+        vector_of(K, k + node.GAIN),
+        vector_of(K, k + node.GAIN + 3),
+    )
     for r in range(rows):
         o = at + 6 * r
         along = dot(axis, vector_of(x, o))
@@ -159,7 +118,11 @@ def pass_turn(K: Floats, k: int, rows: int, x: Floats, at: int, g: Floats, place
 @compiled_into
 def pass_slide(K: Floats, k: int, rows: int, x: Floats, at: int, g: Floats, place: int) -> None:
     """Take from loads what the freedom of a translation takes."""
-    axis, u, v = vector_of(K, k + AXIS_NOW), vector_of(K, k + GAIN), vector_of(K, k + GAIN + 3)
+    axis, u, v = (
+        vector_of(K, k + node.AXIS_NOW),
+        vector_of(K, k + node.GAIN),
+        vector_of(K, k + node.GAIN + 3),
+    )
     for r in range(rows):
         o = at + 6 * r
         along = dot(axis, vector_of(x, o + 3))
@@ -173,7 +136,7 @@ def pass_ball(
     K: Floats, k: int, rows: int, x: Floats, at: int, g: Floats, place: int, size: int
 ) -> None:
     """Take from loads what the freedoms of a ball take, or of a free body: all that is left."""
-    H = nine_of(K, k + MATRIX_H)
+    H = nine_of(K, k + node.MATRIX_H)
     for r in range(rows):
         o = at + 6 * r
         moment = vector_of(x, o)
@@ -203,28 +166,28 @@ def multiply_loads(system: System) -> None:
     g, K, tree = pointer(kept.loads), pointer(system.tree.work), pointer(system.tree.nodes)
     zero(kept.matrix)
     for q in range(kept.pairs.shape[0]):
-        p = PAIR_WIDTH * q
-        k = WORK_WIDTH * pairs[p + PAIR_NODE]
-        motion = tree[TREE_WIDTH * pairs[p + PAIR_NODE] + MOTION]
-        left, right = pairs[p + LEFT_LOADS], pairs[p + RIGHT_LOADS]
-        row, column = pairs[p + LEFT], pairs[p + RIGHT]
-        for r in range(pairs[p + LEFT_COUNT]):
-            at = profile[PROFILE_WIDTH * (row + r) + PLACE] + column
-            count = r + 1 if row == column else pairs[p + RIGHT_COUNT]
-            if motion == SPHERICAL:
-                n = solve_factored(six_of(K, k + FACTORS_BALL), vector_of(g, left + 3 * r))
+        p = layout.PAIR_WIDTH * q
+        k = node.WORK_WIDTH * pairs[p + layout.PAIR_NODE]
+        motion = tree[node.TREE_WIDTH * pairs[p + layout.PAIR_NODE] + node.MOTION]
+        left, right = pairs[p + layout.LEFT_LOADS], pairs[p + layout.RIGHT_LOADS]
+        row, column = pairs[p + layout.LEFT], pairs[p + layout.RIGHT]
+        for r in range(pairs[p + layout.LEFT_COUNT]):
+            at = profile[layout.PROFILE_WIDTH * (row + r) + layout.PLACE] + column
+            count = r + 1 if row == column else pairs[p + layout.RIGHT_COUNT]
+            if motion == node.SPHERICAL:
+                n = solve_factored(six_of(K, k + node.FACTORS_BALL), vector_of(g, left + 3 * r))
                 for e in range(count):
                     S[at + e] += dot(n, vector_of(g, right + 3 * e))
-            elif motion == FREE:
-                n = solve_factored(six_of(K, k + FACTORS_FREE), vector_of(g, left + 6 * r))
+            elif motion == node.FREE:
+                n = solve_factored(six_of(K, k + node.FACTORS_FREE), vector_of(g, left + 6 * r))
                 f = solve_factored(
-                    factors_of(six_of(K, k + MATRIX_M)), vector_of(g, left + 6 * r + 3)
+                    factors_of(six_of(K, k + node.MATRIX_M)), vector_of(g, left + 6 * r + 3)
                 )
                 for e in range(count):
                     o = right + 6 * e
                     S[at + e] += dot(n, vector_of(g, o)) + dot(f, vector_of(g, o + 3))
             else:
-                x = g[left + r] * K[k + INVERSE]
+                x = g[left + r] * K[k + node.INVERSE]
                 for e in range(count):
                     S[at + e] += x * g[right + e]
 
@@ -236,18 +199,21 @@ def lacking_accelerations(system: System) -> None:
     cuts, ends, ways = pointer(kept.cuts), pointer(kept.ends), pointer(kept.ways)
     D, K, right = pointer(kept.D), pointer(system.tree.work), pointer(kept.right)
     for q in range(kept.cuts.shape[0]):
-        c = CUT_WIDTH * q
-        rows, first = cuts[c + ROW_COUNT], cuts[c + FIRST]
+        c = layout.CUT_WIDTH * q
+        rows, first = cuts[c + layout.ROW_COUNT], cuts[c + layout.FIRST]
         for r in range(rows):
-            right[first + r] = system.gamma[cuts[c + FIRST_ROW] + r]
-        for e in range(cuts[c + FIRST_END], cuts[c + LAST_END]):
-            step, block = ends[END_WIDTH * e + END_STEP], ends[END_WIDTH * e + END_BLOCK]
-            k = WORK_WIDTH * ways[STEP_WIDTH * step + NODE]
-            a = vector_of(K, k + POINT_ACCELERATION)
-            a = add(a, times(K, k + SPIN, vector_of(K, k + CENTRE_NOW)))
-            subtract_product(D, block, rows, a, vector_of(K, k + ALPHA), right, first)
-        for step in range(cuts[c + FIRST_STEP], cuts[c + LAST_STEP]):
-            subtract_free_rates(system, STEP_WIDTH * step, rows, first)
+            right[first + r] = system.gamma[cuts[c + layout.FIRST_ROW] + r]
+        for e in range(cuts[c + layout.FIRST_END], cuts[c + layout.LAST_END]):
+            step, block = (
+                ends[layout.END_WIDTH * e + layout.END_STEP],
+                ends[layout.END_WIDTH * e + layout.END_BLOCK],
+            )
+            k = node.WORK_WIDTH * ways[layout.STEP_WIDTH * step + layout.NODE]
+            a = vector_of(K, k + node.ACCELERATION)
+            a = add(a, times(K, k + node.SPIN, vector_of(K, k + node.CENTRE_NOW)))
+            subtract_product(D, block, rows, a, vector_of(K, k + node.ALPHA), right, first)
+        for step in range(cuts[c + layout.FIRST_STEP], cuts[c + layout.LAST_STEP]):
+            subtract_free_rates(system, layout.STEP_WIDTH * step, rows, first)
 
 
 @compiled_into
@@ -264,20 +230,24 @@ def subtract_product(
 def subtract_free_rates(system: System, s: int, rows: int, first: int) -> None:
     """Subtract what the rates of a node do to rows that pass it; s: place of the step."""
     K, ways, g = pointer(system.tree.work), pointer(system.tree.kept.ways), system.tree.kept.loads
-    node, right = ways[s + NODE], system.tree.kept.right
-    k, motion, place = WORK_WIDTH * node, system.tree.nodes[node, MOTION], ways[s + LOADS]
-    if motion == SPHERICAL:
+    n, right = ways[s + layout.NODE], system.tree.kept.right
+    k, motion, place = (
+        node.WORK_WIDTH * n,
+        system.tree.nodes[n, node.MOTION],
+        ways[s + layout.LOADS],
+    )
+    if motion == node.SPHERICAL:
         for r in range(rows):
-            right[first + r] -= dot(vector_of(g, place + 3 * r), vector_of(K, k + MOMENT))
-    elif motion == FREE:
-        a = solve_factored(factors_of(six_of(K, k + MATRIX_M)), vector_of(K, k + FORCE))
+            right[first + r] -= dot(vector_of(g, place + 3 * r), vector_of(K, k + node.MOMENT))
+    elif motion == node.FREE:
+        a = solve_factored(factors_of(six_of(K, k + node.MATRIX_M)), vector_of(K, k + node.FORCE))
         for r in range(rows):
             o = place + 6 * r
-            along = dot(vector_of(g, o), vector_of(K, k + MOMENT))
+            along = dot(vector_of(g, o), vector_of(K, k + node.MOMENT))
             right[first + r] -= along + dot(vector_of(g, o + 3), a)
-    elif motion in (REVOLUTE, PRISMATIC):
+    elif motion in (node.REVOLUTE, node.PRISMATIC):
         for r in range(rows):
-            right[first + r] -= g[place + r] * K[k + FREE_RATE]
+            right[first + r] -= g[place + r] * K[k + node.FREE_RATE]
 
 
 @compiled
@@ -287,12 +257,15 @@ def lacking_velocities(system: System) -> None:
     cuts, ends = pointer(kept.cuts), pointer(kept.ends)
     D, b, right = pointer(kept.D), pointer(system.tree.places), pointer(kept.right)
     for q in range(kept.cuts.shape[0]):
-        c = CUT_WIDTH * q
-        rows, first = cuts[c + ROW_COUNT], cuts[c + FIRST]
+        c = layout.CUT_WIDTH * q
+        rows, first = cuts[c + layout.ROW_COUNT], cuts[c + layout.FIRST]
         for r in range(rows):
-            right[first + r] = system.nu[cuts[c + FIRST_ROW] + r]
-        for e in range(cuts[c + FIRST_END], cuts[c + LAST_END]):
-            o, block = BODY_WIDTH * ends[END_WIDTH * e + END_BODY], ends[END_WIDTH * e + END_BLOCK]
+            right[first + r] = system.nu[cuts[c + layout.FIRST_ROW] + r]
+        for e in range(cuts[c + layout.FIRST_END], cuts[c + layout.LAST_END]):
+            o, block = (
+                BODY_WIDTH * ends[layout.END_WIDTH * e + layout.END_BODY],
+                ends[layout.END_WIDTH * e + layout.END_BLOCK],
+            )
             subtract_product(D, block, rows, vector_of(b, o + V), vector_of(b, o + W), right, first)
 
 
@@ -301,12 +274,12 @@ def rest(system: System) -> None:
     """Forget the forces that ``reduce`` left: what follows is the effect of kept rows alone."""
     K, nodes = pointer(system.tree.work), system.tree.nodes
     for n in range(1, nodes.shape[0]):
-        k, motion = WORK_WIDTH * n, nodes[n, MOTION]
-        if motion in (REVOLUTE, PRISMATIC):
-            K[k + FREE_RATE] = 0.0
+        k, motion = node.WORK_WIDTH * n, nodes[n, node.MOTION]
+        if motion in (node.REVOLUTE, node.PRISMATIC):
+            K[k + node.FREE_RATE] = 0.0
         else:
-            put(K, k + MOMENT, (0.0, 0.0, 0.0))
-            put(K, k + FORCE, (0.0, 0.0, 0.0))
+            put(K, k + node.MOMENT, (0.0, 0.0, 0.0))
+            put(K, k + node.FORCE, (0.0, 0.0, 0.0))
 
 
 @compiled
@@ -316,27 +289,27 @@ def push_freedoms(system: System) -> None:
     cuts, ways = pointer(kept.cuts), pointer(kept.ways)
     g, K, tree = pointer(kept.loads), pointer(system.tree.work), pointer(system.tree.nodes)
     for q in range(kept.cuts.shape[0]):
-        c = CUT_WIDTH * q
-        rows, x = cuts[c + ROW_COUNT], kept.multipliers[cuts[c + FIRST] :]
-        for step in range(cuts[c + FIRST_STEP], cuts[c + LAST_STEP]):
-            s = STEP_WIDTH * step
-            node, place = ways[s + NODE], ways[s + LOADS]
-            k, motion = WORK_WIDTH * node, tree[TREE_WIDTH * node + MOTION]
-            if motion == SPHERICAL:
+        c = layout.CUT_WIDTH * q
+        rows, x = cuts[c + layout.ROW_COUNT], kept.multipliers[cuts[c + layout.FIRST] :]
+        for step in range(cuts[c + layout.FIRST_STEP], cuts[c + layout.LAST_STEP]):
+            s = layout.STEP_WIDTH * step
+            i, place = ways[s + layout.NODE], ways[s + layout.LOADS]
+            k, motion = node.WORK_WIDTH * i, tree[node.TREE_WIDTH * i + node.MOTION]
+            if motion == node.SPHERICAL:
                 n = sum_of_loads(g, place, 3, rows, x)
-                change = solve_factored(six_of(K, k + FACTORS_BALL), n)
-                put(K, k + MOMENT, add(vector_of(K, k + MOMENT), change))
-            elif motion == FREE:
+                change = solve_factored(six_of(K, k + node.FACTORS_BALL), n)
+                put(K, k + node.MOMENT, add(vector_of(K, k + node.MOMENT), change))
+            elif motion == node.FREE:
                 n = sum_of_loads(g, place, 6, rows, x)
-                change = solve_factored(six_of(K, k + FACTORS_FREE), n)
-                put(K, k + MOMENT, add(vector_of(K, k + MOMENT), change))
+                change = solve_factored(six_of(K, k + node.FACTORS_FREE), n)
+                put(K, k + node.MOMENT, add(vector_of(K, k + node.MOMENT), change))
                 f = sum_of_loads(g, place + 3, 6, rows, x)
-                put(K, k + FORCE, add(vector_of(K, k + FORCE), f))
-            elif motion in (REVOLUTE, PRISMATIC):
+                put(K, k + node.FORCE, add(vector_of(K, k + node.FORCE), f))
+            elif motion in (node.REVOLUTE, node.PRISMATIC):
                 total = 0.0
                 for r in range(rows):
                     total += g[place + r] * x[r]
-                K[k + FREE_RATE] += total * K[k + INVERSE]
+                K[k + node.FREE_RATE] += total * K[k + node.INVERSE]
 
 
 @compiled_into

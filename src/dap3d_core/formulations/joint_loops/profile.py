@@ -8,18 +8,7 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.metric import in_body_axes, scaled_moment
-from dap3d_core.formulations.joint_loops.layout import (
-    COUPLED,
-    CUT_WIDTH,
-    END_BLOCK,
-    END_BODY,
-    END_WIDTH,
-    FIRST,
-    FIRST_END,
-    LAST_END,
-    PLACE,
-    ROW_COUNT,
-)
+from dap3d_core.formulations.joint_loops import layout
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.scalar_math import where
@@ -51,19 +40,19 @@ def weigh_kept_rows(system: System, part: float) -> None:
         return
     cuts, ends, D = pointer(kept.cuts), pointer(kept.ends), pointer(kept.D)
     for q in range(kept.cuts.shape[0]):
-        c = CUT_WIDTH * q
-        for e in range(cuts[c + FIRST_END], cuts[c + LAST_END]):
-            b = ends[END_WIDTH * e + END_BODY]
+        c = layout.CUT_WIDTH * q
+        for e in range(cuts[c + layout.FIRST_END], cuts[c + layout.LAST_END]):
+            b = ends[layout.END_WIDTH * e + layout.END_BODY]
             s, k = system.body[b], system.metric[b]
-            for r in range(cuts[c + ROW_COUNT]):
-                d = ends[END_WIDTH * e + END_BLOCK] + 6 * r
+            for r in range(cuts[c + layout.ROW_COUNT]):
+                d = ends[layout.END_WIDTH * e + layout.END_BLOCK] + 6 * r
                 x, y, z = in_body_axes(s, D[d + 3], D[d + 4], D[d + 5])
                 x, y, z = scaled_moment(k, x, y, z)
                 shift = (D[d] * D[d] + D[d + 1] * D[d + 1] + D[d + 2] * D[d + 2]) * k[0] * k[0]
-                kept.compliance[cuts[c + FIRST] + r] += shift + x * x + y * y + z * z
+                kept.compliance[cuts[c + layout.FIRST] + r] += shift + x * x + y * y + z * z
     contacts = system.contacts.shape[0] > 0
     for j in range(kept.compliance.shape[0]):
-        diagonal = kept.matrix[kept.profile[j, PLACE] + j]
+        diagonal = kept.matrix[kept.profile[j, layout.PLACE] + j]
         least = LEAST_FREE * kept.compliance[j]
         if contacts and kept.compliance[j] == 0.0:  # a row that does not hold
             kept.compliance[j] = 1.0
@@ -80,16 +69,16 @@ def factor_profile(system: System) -> bool:
     S, profile, E = pointer(kept.matrix), kept.profile, kept.compliance
     positive = True
     for j in range(profile.shape[0]):
-        first, row = profile[j, COUPLED], profile[j, PLACE]
+        first, row = profile[j, layout.COUPLED], profile[j, layout.PLACE]
         d = S[row + j] + E[j]
         for i in range(first, j):
-            s, other = S[row + i], profile[i, PLACE]
-            for e in range(max(first, profile[i, COUPLED]), i):
+            s, other = S[row + i], profile[i, layout.PLACE]
+            for e in range(max(first, profile[i, layout.COUPLED]), i):
                 s -= S[row + e] * S[other + e]
             S[row + i] = s  # d times L
         for i in range(first, j):
             s = S[row + i]
-            S[row + i] = s * S[profile[i, PLACE] + i]
+            S[row + i] = s * S[profile[i, layout.PLACE] + i]
             d -= s * S[row + i]
         positive = positive and d > 0.0
         S[row + j] = 1.0 / d if d > 0.0 else np.nan
@@ -131,15 +120,15 @@ def substitute(system: System, z: Floats) -> None:
     kept = system.tree.kept
     S, profile = pointer(kept.matrix), kept.profile
     for j in range(profile.shape[0]):
-        row, s = profile[j, PLACE], z[j]
-        for i in range(profile[j, COUPLED], j):
+        row, s = profile[j, layout.PLACE], z[j]
+        for i in range(profile[j, layout.COUPLED], j):
             s -= S[row + i] * z[i]
         z[j] = s
     for j in range(profile.shape[0]):
-        z[j] *= S[profile[j, PLACE] + j]
+        z[j] *= S[profile[j, layout.PLACE] + j]
     for j in range(profile.shape[0] - 1, -1, -1):
-        row, s = profile[j, PLACE], z[j]
-        for i in range(profile[j, COUPLED], j):
+        row, s = profile[j, layout.PLACE], z[j]
+        for i in range(profile[j, layout.COUPLED], j):
             z[i] -= S[row + i] * s
 
 
@@ -151,10 +140,10 @@ def pivot_lengths(system: System, lengths: Floats) -> int:
     """
     kept, counted = system.tree.kept, 0
     for q in range(kept.cuts.shape[0]):
-        product, small, first = 1.0, 0, kept.cuts[q, FIRST]
-        for j in range(first, first + kept.cuts[q, ROW_COUNT]):
+        product, small, first = 1.0, 0, kept.cuts[q, layout.FIRST]
+        for j in range(first, first + kept.cuts[q, layout.ROW_COUNT]):
             if kept.smallest[j] > 0.0:
-                pivot = kept.matrix[kept.profile[j, PLACE] + j]
+                pivot = kept.matrix[kept.profile[j, layout.PLACE] + j]
                 ratio = 1.0 / (abs(pivot) * kept.smallest[j])
                 small |= not ratio > 1.0
                 product *= SINGULAR_PIVOT_RATIO * ratio

@@ -11,24 +11,9 @@ from dap3d_core.assembly.arrays import Floats, Integers, KeptRowArrays
 from dap3d_core.formulations import RHS
 from dap3d_core.formulations.coordinates import UnsuitableError
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
-from dap3d_core.formulations.joint.node_layout import (
-    FIXED,
-    FREE,
-    MOTION,
-    PARENT,
-    PRISMATIC,
-    REVOLUTE,
-    SPHERICAL,
-)
+from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.formulations.joint.tree_nodes import TreeNodes
-from dap3d_core.formulations.joint_loops.layout import (
-    CUT_WIDTH,
-    END_WIDTH,
-    PAIR_WIDTH,
-    PART_OF_ROW,
-    PLACE,
-    STEP_WIDTH,
-)
+from dap3d_core.formulations.joint_loops import layout
 from dap3d_core.formulations.joint_loops.profile import PART
 from dap3d_core.interface.codegen.loop_source import stride
 from dap3d_core.linear.ldlt.factor import SINGULAR_PIVOT_RATIO
@@ -37,7 +22,7 @@ from dap3d_core.linear.ordering.spanning_forest import CARRY
 from dap3d_core.model import Group, Model
 
 #: Freedoms of nodes, and numbers of a load there.
-FREEDOMS = {FIXED: 0, REVOLUTE: 1, PRISMATIC: 1, SPHERICAL: 3, FREE: 6}
+FREEDOMS = {node.FIXED: 0, node.REVOLUTE: 1, node.PRISMATIC: 1, node.SPHERICAL: 3, node.FREE: 6}
 #: Numbers that the tables and arrays may hold: 800 MB.
 MOST_NUMBERS = 100_000_000
 #: Compliances by which rows are judged, as parts of their diagonals.
@@ -81,7 +66,7 @@ def cost_ratio(kept: KeptRows, nodes: TreeNodes, plan: Plan, body_count: int) ->
 def kept_rows(joints: Sequence[int], model: Model, nodes: TreeNodes) -> KeptRows:
     """Ways of the rows of kept joints."""
     node_of_body = {int(b): n for n, b in enumerate(nodes.body) if b > 0}
-    parent, motion = nodes.table[:, PARENT].tolist(), nodes.table[:, MOTION].tolist()
+    parent, motion = nodes.table[:, node.PARENT].tolist(), nodes.table[:, node.MOTION].tolist()
     found = []
     for k in joints:
         way: set[int] = set()
@@ -103,7 +88,7 @@ def kept_rows(joints: Sequence[int], model: Model, nodes: TreeNodes) -> KeptRows
     work += int(np.sum(width * width)) // 2
     for n, cuts in passing.items():
         count, size = sum(rows[c] for c in cuts), FREEDOMS[motion[n]]
-        numbers += count * size + PAIR_WIDTH * len(cuts) * (len(cuts) + 1) // 2
+        numbers += count * size + layout.PAIR_WIDTH * len(cuts) * (len(cuts) + 1) // 2
         work += CARRY * count + size * count * (count + 1) // 2
     return KeptRows(tuple(k for _, k in found), ways, first, coupled, numbers, work)
 
@@ -155,7 +140,7 @@ def kept_row_arrays(
     ways: list[tuple[int, ...]] = []
     places, size = [], 0
     node_of_body = {int(b): n for n, b in enumerate(nodes.body) if b > 0}
-    parent, motion = nodes.table[:, PARENT].tolist(), nodes.table[:, MOTION].tolist()
+    parent, motion = nodes.table[:, node.PARENT].tolist(), nodes.table[:, node.MOTION].tolist()
     acting = _acting_rows(model)
     for k, way, first in zip(kept.joints, kept.ways, kept.first.tolist(), strict=False):
         (row, rows), begin = acting[k], len(ways)
@@ -180,10 +165,10 @@ def kept_row_arrays(
     return KeptRowArrays(
         calls=np.concatenate(calls),
         call_counts=np.array([len(c) for c in calls], dtype=np.int64),
-        cuts=_table(cuts, CUT_WIDTH),
-        ends=_table(ends, END_WIDTH),
-        ways=_table(ways, STEP_WIDTH),
-        pairs=_table(pairs, PAIR_WIDTH),
+        cuts=_table(cuts, layout.CUT_WIDTH),
+        ends=_table(ends, layout.END_WIDTH),
+        ways=_table(ways, layout.STEP_WIDTH),
+        pairs=_table(pairs, layout.PAIR_WIDTH),
         profile=np.stack([kept.coupled, start[:-1] - kept.coupled], axis=1),
         D=np.zeros(plan.block_size),
         loads=np.zeros(size),
@@ -246,16 +231,16 @@ def judge_kept_rows(evaluator: Evaluator, y: Floats) -> None:
     """
     kept: KeptRowArrays = evaluator.system.tree.kept
     if evaluator.model.contact_count:  # those that close make other pivots
-        kept.smallest[:], kept.settings[PART_OF_ROW] = 0.0, PART
+        kept.smallest[:], kept.settings[layout.PART_OF_ROW] = 0.0, PART
         return
     more, less = (_pivots(evaluator, y, part) for part in (SMALL, SMALL / LESS))
     redundant = ~(more < np.sqrt(LESS) * less)
     kept.smallest[:] = np.where(redundant, 0.0, SINGULAR_PIVOT_RATIO * less)
-    kept.settings[PART_OF_ROW] = PART if redundant.any() else 0.0
+    kept.settings[layout.PART_OF_ROW] = PART if redundant.any() else 0.0
 
 
 def _pivots(evaluator: Evaluator, y: Floats, part: float) -> Floats:
     kept = evaluator.system.tree.kept
-    kept.settings[PART_OF_ROW] = part
+    kept.settings[layout.PART_OF_ROW] = part
     evaluator.functions[RHS](0.0, y, np.zeros_like(y), evaluator.system, evaluator.loops)
-    return 1.0 / kept.matrix[kept.profile[:, PLACE] + np.arange(len(kept.profile))]
+    return 1.0 / kept.matrix[kept.profile[:, layout.PLACE] + np.arange(len(kept.profile))]

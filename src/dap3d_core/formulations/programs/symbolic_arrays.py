@@ -16,7 +16,7 @@ from dap3d_core.assembly.arrays import (
 )
 from dap3d_core.assembly.metric import METRIC_CONSTANTS
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.formulations.joint.node_layout import WORK_WIDTH
+from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.kernels.compiler.straight_line import Item, StraightLine
 from dap3d_core.kernels.compiler.types import FLOAT, Array, Struct
 from dap3d_core.kernels.compiler.units import address_of
@@ -63,7 +63,7 @@ def _constants(evaluator: Evaluator, of_start: bool) -> Iterator[tuple[str, Inte
         masses = slice(MASS, None) if of_start else slice(0)
         yield "tree.places", _of_rows(system.tree.places, masses)
         yield "tree.constants", np.arange(system.tree.constants.size)
-        yield "tree.work", np.arange(WORK_WIDTH)  # of ground, which does not move
+        yield "tree.work", np.arange(node.WORK_WIDTH)  # of ground, which does not move
         if system.tree.kept is not None:
             for name in ("settings", *(("smallest",) if of_start else ())):
                 yield f"tree.kept.{name}", np.arange(getattr(system.tree.kept, name).size)

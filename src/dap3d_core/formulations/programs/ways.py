@@ -11,7 +11,7 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, velocity_offset
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.formulations.joint.node_layout import RATE
+from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.kernels.compiler import types as t
 from dap3d_core.kernels.compiler.straight_line import StraightLine
 from dap3d_core.kernels.compiler.trace import Symbol
@@ -78,7 +78,7 @@ def _nearer(
     """States near their constraints; on them in positions, and in velocities as well."""
     on = np.array([tracer.number(tracer.value(x)) for x in left], dtype=float)
     if evaluator.formulation.has_own_coordinates:
-        rates = evaluator.system.tree.nodes[1:, RATE]
+        rates = evaluator.system.tree.nodes[1:, node.RATE]
         first = int(np.min(rates, where=rates > 0, initial=len(on)))
     else:
         first = velocity_offset(1, evaluator.model.body_count)

@@ -41,12 +41,8 @@ from dap3d_core.formulations.common.friction import (
     has_friction,
     store_applied_forces,
 )
-from dap3d_core.formulations.stabilized_index2.jacobian import (
-    PLACE,
-    ROW_COUNT,
-    Tangent,
-    turn_to_body,
-)
+from dap3d_core.formulations.stabilized_index2 import jacobian
+from dap3d_core.formulations.stabilized_index2.jacobian import Tangent, turn_to_body
 from dap3d_core.formulations.stabilized_index2.state_tangent import (
     FIRST,
     UNKNOWN,
@@ -198,7 +194,7 @@ def fill_matrix(s: Any, K: Any, blocks: Integers, matrix: StageMatrix, tangent: 
                 K[right + 2 * m * (6 + c) + m + r] = -v
             o += 6
     for p in range(matrix.read_place.shape[0]):
-        o, rows = tangent.readings[p, PLACE], tangent.readings[p, ROW_COUNT]
+        o, rows = tangent.readings[p, jacobian.PLACE], tangent.readings[p, jacobian.ROW_COUNT]
         right, m, first = matrix.read_place[p, 0], matrix.read_place[p, 1], matrix.read_place[p, 2]
         for r in range(rows if o >= 0 else 0):
             for c in range(6):

@@ -20,28 +20,8 @@ from dap3d_core.assembly.arrays import Integers, System
 from dap3d_core.assembly.evaluate import zero
 from dap3d_core.assembly.metric import in_body_axes, scaled_moment
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.formulations.stabilized_index2 import jacobian
 from dap3d_core.formulations.stabilized_index2.jacobian import (
-    C_BY_STATE,
-    COUNT,
-    ELEMENT_WIDTH,
-    FORCE_BY_STATE,
-    FRICTION_ELEMENT,
-    JOINT_ELEMENT,
-    KIND,
-    LOOP,
-    NU_BY_STATE,
-    POSITION_ELEMENT,
-    RATE_BY_BODY,
-    RATE_BY_STATE,
-    RATE_ELEMENT,
-    ROWS,
-    ROWS_OF,
-    SLOT_COUNT,
-    SLOTS_OF,
-    STRIDE,
-    VELOCITY,
-    WIDTH,
-    WRENCH_ELEMENT,
     StateTangent,
     Tangent,
     call_element,
@@ -58,9 +38,13 @@ from dap3d_core.kernels.runtime.function_lists import LoopArrays, loop_list
 from dap3d_core.kernels.runtime.loop_modules import build_differentiated
 from dap3d_core.model import Group, Model
 
-_KINDS = {"wrench": WRENCH_ELEMENT, "acceleration": JOINT_ELEMENT, "friction": FRICTION_ELEMENT}
+_KINDS = {
+    "wrench": jacobian.WRENCH_ELEMENT,
+    "acceleration": jacobian.JOINT_ELEMENT,
+    "friction": jacobian.FRICTION_ELEMENT,
+}
 #: The same of types with states of their own, as their derivatives by states need them.
-_WITH_STATES = {"rate": RATE_ELEMENT, "position": POSITION_ELEMENT}
+_WITH_STATES = {"rate": jacobian.RATE_ELEMENT, "position": jacobian.POSITION_ELEMENT}
 #: Members of ``Tangent`` that differentiated loops write, and what is made of it.
 OF_LOOPS = ("D", "gamma", "nu", "minus_lambda", "force", "out", "kept", "ahead")
 #: Numbers of a block of ``coupling``.
@@ -85,7 +69,7 @@ def make_tangent(evaluator: Evaluator) -> tuple[Tangent, Any]:
             continue
         codes = [kinds[kind]]
         if kind == "wrench" and computes_rate(group.type_info):
-            codes.append(RATE_ELEMENT)
+            codes.append(jacobian.RATE_ELEMENT)
         slots = len(group.type_info.layout.slots)
         rows = group.type_info.row_count
         read = _joints_read(group) if kind == "friction" else []
@@ -93,7 +77,7 @@ def make_tangent(evaluator: Evaluator) -> tuple[Tangent, Any]:
                       layout.integers, rows, count, int(_sees_velocity(kind, group)),
                       len(readings), len(read)) for code in codes]  # fmt: skip
         if source := write(group.type_info, kind):
-            loops.append(build_differentiated(source, WIDTH))
+            loops.append(build_differentiated(source, jacobian.WIDTH))
         at += [layout.integers - 1 if layout.states else -1 for _ in codes]
         for q, bodies in enumerate(group.bodies.tolist()):
             for joints in read:
@@ -107,7 +91,7 @@ def make_tangent(evaluator: Evaluator) -> tuple[Tangent, Any]:
     blocks = [(where, a, b) for (a, b), where in place.items()]
     sizes = (plan.block_size, *(3 * [plan.row_size]), system.force.size, *(3 * [widest]))
     tangent = Tangent(
-        elements=np.array(elements, dtype=np.int64).reshape(-1, ELEMENT_WIDTH),
+        elements=np.array(elements, dtype=np.int64).reshape(-1, jacobian.ELEMENT_WIDTH),
         pairs=np.concatenate([np.zeros(0, dtype=np.int64), *pairs]),
         blocks=np.array(blocks, dtype=np.int64).reshape(-1, 3),
         coupling=np.zeros(_BLOCK * len(place)),
@@ -117,7 +101,10 @@ def make_tangent(evaluator: Evaluator) -> tuple[Tangent, Any]:
         bends=np.zeros(1),
         states=_state_tangent(evaluator.model, at),
         wide=_wide(system),
-        **{name: np.zeros(WIDTH * numbers) for name, numbers in zip(OF_LOOPS, sizes, strict=True)},
+        **{
+            name: np.zeros(jacobian.WIDTH * numbers)
+            for name, numbers in zip(OF_LOOPS, sizes, strict=True)
+        },
     )
     return tangent, loop_list(loops)
 
@@ -125,7 +112,9 @@ def make_tangent(evaluator: Evaluator) -> tuple[Tangent, Any]:
 def _wide(system: Any) -> LoopArrays:
     """Arrays of differentiated loops: ``WIDTH`` numbers for each of a system's."""
     arrays = {name: getattr(system, name) for name in ("body", "F", "par", "states")}
-    wide = {name: np.zeros((*x.shape[:-1], WIDTH * x.shape[-1])) for name, x in arrays.items()}
+    wide = {
+        name: np.zeros((*x.shape[:-1], jacobian.WIDTH * x.shape[-1])) for name, x in arrays.items()
+    }
     return LoopArrays(idx=system.idx, **wide)
 
 
@@ -210,9 +199,9 @@ def differentiate_states(t: float, system: System, loops: Any, tangent: Tangent)
     zero(tangent.states.values)
     for e in range(tangent.elements.shape[0]):
         row = tangent.elements[e]
-        for q in range(system.groups[row[LOOP], 2] if tangent.states.at[e] >= 0 else 0):
+        for q in range(system.groups[row[jacobian.LOOP], 2] if tangent.states.at[e] >= 0 else 0):
             differentiate_by_states(t, e, q, system, loops, tangent)
-            if row[KIND] == RATE_ELEMENT:
+            if row[jacobian.KIND] == jacobian.RATE_ELEMENT:
                 differentiate_rate(t, e, q, system, loops, tangent)
     scale_state_tangent(system, tangent)
 
@@ -223,28 +212,28 @@ def differentiate_by_states(
 ) -> None:
     """Add the derivatives of what an element returns by its own states, unscaled."""
     row, own, z = tangent.elements[e], tangent.states, tangent.wide.states
-    first = system.idx[system.groups[row[LOOP], 0] + q * row[STRIDE] + own.at[e]]
+    first = system.idx[system.groups[row[jacobian.LOOP], 0] + q * row[jacobian.STRIDE] + own.at[e]]
     record = own.records[own.record[first]]
-    m, size = record[COUNT], 6 * row[SLOT_COUNT]
+    m, size = record[jacobian.COUNT], 6 * row[jacobian.SLOT_COUNT]
     for k in range(m):
-        z[WIDTH * (first + k) + 1] = 1.0
+        z[jacobian.WIDTH * (first + k) + 1] = 1.0
         call_element(t, e, q, system, loops, tangent)
-        z[WIDTH * (first + k) + 1] = 0.0
-        if row[KIND] == RATE_ELEMENT:
-            add_column(0, m, record[RATE_BY_STATE] + k, m, tangent)
-        elif row[KIND] == POSITION_ELEMENT:
-            add_column(0, row[ROWS], record[C_BY_STATE] + k, m, tangent)
+        z[jacobian.WIDTH * (first + k) + 1] = 0.0
+        if row[jacobian.KIND] == jacobian.RATE_ELEMENT:
+            add_column(0, m, record[jacobian.RATE_BY_STATE] + k, m, tangent)
+        elif row[jacobian.KIND] == jacobian.POSITION_ELEMENT:
+            add_column(0, row[jacobian.ROWS], record[jacobian.C_BY_STATE] + k, m, tangent)
         else:
-            add_column(0, size, record[FORCE_BY_STATE] + k, m, tangent)
-            rows = row[ROWS] if row[KIND] == JOINT_ELEMENT else 0
-            add_column(size, rows, record[NU_BY_STATE] + k, m, tangent)
+            add_column(0, size, record[jacobian.FORCE_BY_STATE] + k, m, tangent)
+            rows = row[jacobian.ROWS] if row[jacobian.KIND] == jacobian.JOINT_ELEMENT else 0
+            add_column(size, rows, record[jacobian.NU_BY_STATE] + k, m, tangent)
 
 
 @compiled
 def add_column(first: int, count: int, place: int, stride: int, tangent: Tangent) -> None:
     """Add slopes of ``count`` outputs of an element to every stride-th value from a place on."""
     for c in range(count):
-        tangent.states.values[place + stride * c] += tangent.out[WIDTH * (first + c) + 1]
+        tangent.states.values[place + stride * c] += tangent.out[jacobian.WIDTH * (first + c) + 1]
 
 
 @compiled
@@ -253,21 +242,21 @@ def differentiate_rate(
 ) -> None:
     """Derivatives of the rates of an element by the coordinates of its bodies, unscaled."""
     row, own, wide = tangent.elements[e], tangent.states, tangent.wide
-    i0 = system.groups[row[LOOP], 0] + q * row[STRIDE]
+    i0 = system.groups[row[jacobian.LOOP], 0] + q * row[jacobian.STRIDE]
     record = own.records[own.record[system.idx[i0 + own.at[e]]]]
-    m = record[COUNT]
-    for n in range(row[SLOT_COUNT]):
-        b, o = system.idx[i0 + n], record[RATE_BY_BODY] + 12 * m * n
+    m = record[jacobian.COUNT]
+    for n in range(row[jacobian.SLOT_COUNT]):
+        b, o = system.idx[i0 + n], record[jacobian.RATE_BY_BODY] + 12 * m * n
         if b == 0:
             continue
         seed_positions(wide.body[b], system.body[b])
-        for level in range(1 + row[VELOCITY]):
+        for level in range(1 + row[jacobian.VELOCITY]):
             if level == 1:
                 seed_velocities(wide.body[b], system.body[b])
             call_element(t, e, q, system, loops, tangent)
             for k in range(m):
                 for c in range(6):
-                    own.values[o + 12 * k + 6 * level + c] = tangent.out[WIDTH * k + 1 + c]
+                    own.values[o + 12 * k + 6 * level + c] = tangent.out[jacobian.WIDTH * k + 1 + c]
         clear(wide.body[b])
 
 
@@ -277,18 +266,22 @@ def scale_state_tangent(system: System, tangent: Tangent) -> None:
     own, v = tangent.states, tangent.states.values
     for e in range(tangent.elements.shape[0]):
         row = tangent.elements[e]
-        for q in range(system.groups[row[LOOP], 2] if row[KIND] == RATE_ELEMENT else 0):
-            i0 = system.groups[row[LOOP], 0] + q * row[STRIDE]
+        for q in range(
+            system.groups[row[jacobian.LOOP], 2]
+            if row[jacobian.KIND] == jacobian.RATE_ELEMENT
+            else 0
+        ):
+            i0 = system.groups[row[jacobian.LOOP], 0] + q * row[jacobian.STRIDE]
             record = own.records[own.record[system.idx[i0 + tangent.states.at[e]]]]
-            m = record[COUNT]
-            for n in range(row[SLOT_COUNT]):
+            m = record[jacobian.COUNT]
+            for n in range(row[jacobian.SLOT_COUNT]):
                 b = system.idx[i0 + n]
                 s, k = system.body[b], system.metric[b]
-                o = record[RATE_BY_BODY] + 12 * m * n
+                o = record[jacobian.RATE_BY_BODY] + 12 * m * n
                 for c in range(m if b > 0 else 0):
                     scale_columns(v, o + 12 * c, k, s)
                     scale_columns(v, o + 12 * c + 6, k, s)
-                o = record[FORCE_BY_STATE] + 6 * m * n
+                o = record[jacobian.FORCE_BY_STATE] + 6 * m * n
                 for c in range(o, o + m if b > 0 else o):
                     f0, f1, f2 = in_body_axes(s, v[c], v[c + m], v[c + 2 * m])
                     v[c], v[c + m], v[c + 2 * m] = k[0] * f0, k[0] * f1, k[0] * f2
@@ -312,23 +305,23 @@ def fill_states(s: Any, K: Any, nodes: Integers, places: Integers, held: Integer
     v = tangent.states.values
     for e in range(nodes.shape[0]):
         record = tangent.states.records[e]
-        m, d = record[COUNT], nodes[e, DIAGONAL]
+        m, d = record[jacobian.COUNT], nodes[e, DIAGONAL]
         for c in range(m):
             K[d + (m + 1) * c] = s
             for k in range(m):
-                K[d + m * c + k] -= v[record[RATE_BY_STATE] + m * c + k]
-        for n in range(record[SLOTS_OF]):
+                K[d + m * c + k] -= v[record[jacobian.RATE_BY_STATE] + m * c + k]
+        for n in range(record[jacobian.SLOTS_OF]):
             if places[e, 2 * n] >= 0:
-                o = record[RATE_BY_BODY] + 12 * m * n
+                o = record[jacobian.RATE_BY_BODY] + 12 * m * n
                 for k in range(12 * m):
                     K[places[e, 2 * n] + k] = -v[o + k]
-                o = record[FORCE_BY_STATE] + 6 * m * n
+                o = record[jacobian.FORCE_BY_STATE] + 6 * m * n
                 for k in range(6 * m):
                     K[places[e, 2 * n + 1] + 6 * m + k] = -v[o + k]
-        for r in range(record[ROWS_OF]):
+        for r in range(record[jacobian.ROWS_OF]):
             d, count = nodes[e, JOINT_BLOCK], nodes[e, NODE_ROWS]
             o, at = m * r, m * (nodes[e, ROW_SHIFT] + r)
             for k in range(m):
                 if held[nodes[e, FIRST_ROW] + r] != 0:
-                    K[d + at + k] = -v[record[C_BY_STATE] + o + k]
-                K[d + m * count + at + k] = -v[record[NU_BY_STATE] + o + k]
+                    K[d + at + k] = -v[record[jacobian.C_BY_STATE] + o + k]
+                K[d + m * count + at + k] = -v[record[jacobian.NU_BY_STATE] + o + k]

@@ -16,28 +16,14 @@ from typing import Any
 import attrs
 import numpy as np
 
+from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.event_location import (
     end_is_across,
     is_sample_across,
     next_length,
     update_switches_after_step,
 )
-from dap3d_core.integrators.stepping.integration_state import (
-    ABSOLUTE,
-    FOUND,
-    MOST,
-    MOST_COUNTED,
-    NOISE,
-    NOT_FINITE,
-    OTHER,
-    RUNNING,
-    SCRATCH,
-    STEP_FLOOR,
-    TRIAL,
-    Function,
-    IntegrationState,
-    Y,
-)
+from dap3d_core.integrators.stepping.integration_state import Function, IntegrationState
 from dap3d_core.integrators.stepping.output import may_step, project_state
 from dap3d_core.integrators.stepping.rounding import record_failure, update_rounding
 from dap3d_core.integrators.stepping.step_control import (
@@ -109,7 +95,7 @@ def allowed_adams_integers(found: Mapping[str, int]) -> dict[str, Container[int]
         "next_order": range(1 if found["first_stage_valid"] else 0, HIGHEST + 1),
         "last_order": range(HIGHEST + 1),
         "is_starting": (0, 1),
-        **dict.fromkeys(("equal_steps", "failure_count"), range(MOST_COUNTED)),
+        **dict.fromkeys(("equal_steps", "failure_count"), range(at.MOST_COUNTED)),
     }
 
 
@@ -162,8 +148,8 @@ def weights(table: Floats, h: float, order: int) -> None:
 @compiled
 def predict(work: AdamsState, h: float, k: int) -> None:
     """Phi*_j; the prediction into TRIAL, the sum of Phi*_0 to Phi*_(k-1) into SCRATCH."""
-    table, star, f, y = work.table, work.scaled, work.differences, work.state[Y]
-    trial, total = work.state[TRIAL], work.state[SCRATCH]
+    table, star, f, y = work.table, work.scaled, work.differences, work.state[at.Y]
+    trial, total = work.state[at.TRIAL], work.state[at.SCRATCH]
     beta, g = table[BETA_ROW], table[G_ROW]
     for i in range(y.size):
         trial[i] = total[i] = 0.0
@@ -193,13 +179,13 @@ def difference_norms(work: AdamsState, k: int, h: float) -> tuple[float, float, 
     What of them is rounding (stepping/rounding.py) is not counted.
     """
     size, star = work.error_size, work.scaled
-    y, trial, change = work.state[Y], work.state[TRIAL], work.state[SCRATCH]
+    y, trial, change = work.state[at.Y], work.state[at.TRIAL], work.state[at.SCRATCH]
     rtol, tolerance, last, before = work.rtol, work.tolerance, k - 1, max(k - 2, 0)
     zero, one, two = 0.0, 0.0, 0.0
     for i in range(size):
         a, b = abs(y[i]), abs(trial[i])
-        noise, wide = tolerance[NOISE, i], tolerance[ABSOLUTE, i] + rtol * (a if a > b else b)
-        noise = min(noise, tolerance[MOST, i] / h)
+        noise, wide = tolerance[at.NOISE, i], tolerance[at.ABSOLUTE, i] + rtol * (a if a > b else b)
+        noise = min(noise, tolerance[at.MOST, i] / h)
         scale = 1.0 / (h * noise if h * noise > wide else wide)
         d0 = change[i]
         d1 = d0 + star[last, i]
@@ -236,7 +222,7 @@ def interpolate(work: AdamsState, back: float, out: Floats) -> None:
     Shampine, Gordon, chapter 5 (their code INTRP); the order is one more than that of the step.
     """
     table, differences, last = work.table, work.differences, work.last_order + 1
-    line, g, psi, y = table[LINE], table[WITHIN], table[PSI], work.state[Y]
+    line, g, psi, y = table[LINE], table[WITHIN], table[PSI], work.state[at.Y]
     for q in range(last):
         line[q] = 1.0 / (q + 1.0)
     g[0], before = 1.0, 0.0
@@ -281,12 +267,12 @@ def state_at(work: AdamsState, t: float, y: Floats) -> None:
 def begin(work: AdamsState, rhs: Function, system: Any, loops: Any) -> None:
     """The rates at the start, the first step, order 1."""
     f = work.differences
-    y = work.state[Y]
+    y = work.state[at.Y]
     work.rhs_count += 1
     rhs(work.t, y, f[0], system, loops)
     work.first_stage_valid = 1
     if not all_finite(f[0]):
-        work.t_stop, work.status = work.t, NOT_FINITE
+        work.t_stop, work.status = work.t, at.NOT_FINITE
         return
     if work.h == 0.0:
         longest = FIRST_PART * (work.times[-1] - work.times[0])
@@ -304,7 +290,7 @@ def step(work: AdamsState, functions: Any, system: Any, loops: Any) -> None:
     rhs, project, accepted, watch = functions
     if work.first_stage_valid == 0:
         begin(work, rhs, system, loops)
-        if work.status != RUNNING:
+        if work.status != at.RUNNING:
             return
     t, t_end, k = work.t, work.times[-1], work.next_order
     h = with_slopes(min(work.h, work.longest_step), 0.0)  # chosen: not to be differentiated
@@ -318,10 +304,10 @@ def step(work: AdamsState, functions: Any, system: Any, loops: Any) -> None:
         t1 = t1 if h == t1 - t else t + h
     update_coefficients(work, h, k)
     predict(work, h, k)
-    trial, table = work.state[TRIAL], work.table
+    trial, table = work.state[at.TRIAL], work.table
     if work.switch_count != 0 and is_sample_across(work, t1, trial, watch, system, loops):
         return
-    rates, change = work.scaled[ROWS - 1], work.state[SCRATCH]
+    rates, change = work.scaled[ROWS - 1], work.state[at.SCRATCH]
     work.rhs_count += 1
     rhs(t1, trial, rates, system, loops)
     for i in range(trial.size):
@@ -334,13 +320,13 @@ def step(work: AdamsState, functions: Any, system: Any, loops: Any) -> None:
         for i in range(trial.size):
             trial[i] += g * change[i]
         failure = project_state(work, t1, trial, project, system, loops)
-        if failure != RUNNING:
+        if failure != at.RUNNING:
             reject(work, t1, h, 1, 0.1, failure)
         elif complete_step(work, t1, rhs, watch, system, loops):
             if turns_are_certain(work, t1, accepted, system, loops):
                 accept(work, t1, k, here, below, lower)
             else:
-                reject(work, t1, h, k, STEP_FOR_TURNS, STEP_FLOOR)
+                reject(work, t1, h, k, STEP_FOR_TURNS, at.STEP_FLOOR)
     elif error <= LARGEST:
         record_failure(work, error, h, work.failure_count != 0)
         work.failure_count += 1
@@ -348,19 +334,19 @@ def step(work: AdamsState, functions: Any, system: Any, loops: Any) -> None:
         if work.failure_count > PATIENCE:
             factor = max(0.1, min(SLOWEST, math.sqrt(PLANNED / here)))
         order = k - 1 if lower else k
-        reject(work, t1, h, 1 if work.failure_count >= PATIENCE else order, factor, STEP_FLOOR)
+        reject(work, t1, h, 1 if work.failure_count >= PATIENCE else order, factor, at.STEP_FLOOR)
     else:
-        reject(work, t1, h, 1, 0.1, NOT_FINITE)
+        reject(work, t1, h, 1, 0.1, at.NOT_FINITE)
 
 
 @compiled
 def error_of(work: AdamsState, t1: float, h: float, k: int, size: float) -> float:
     """Error of a step to t1 whose Phi_k has a scaled size; up to 1.0 it is good enough."""
-    table, change, rates = work.table, work.state[SCRATCH], work.scaled[ROWS - 1]
+    table, change, rates = work.table, work.state[at.SCRATCH], work.scaled[ROWS - 1]
     weight = h * abs(table[G_ROW, k - 1] - table[G_ROW, k])
     error = weight * size
     if 1.0 < error <= LARGEST and h * SLOWEST < step_floor(work):
-        y, trial, f0 = work.state[Y], work.state[TRIAL], work.differences[0]
+        y, trial, f0 = work.state[at.Y], work.state[at.TRIAL], work.differences[0]
         doubt = EPSILON * max(abs(work.t), abs(t1))
         found = scaled_beyond(
             change, y, trial, f0, rates, doubt, work.error_size, work.rtol, work.tolerance
@@ -376,16 +362,16 @@ def complete_step(
 ) -> bool:
     """The rates at the trial state; False where they are not finite, or it lies across a switch."""
     rates = work.scaled[ROWS - 1]
-    trial, total, watched = work.state[TRIAL], work.state[SCRATCH], work.switch_count != 0
+    trial, total, watched = work.state[at.TRIAL], work.state[at.SCRATCH], work.switch_count != 0
     for i in range(trial.size):
         total[i] = rates[i] - total[i]  # the sum of Phi*_j again
     if watched:  # before f, as of runge_kutta/step.py
-        evaluate(work, t1, trial, FOUND, watch, system, loops)
+        evaluate(work, t1, trial, at.FOUND, watch, system, loops)
     if watched or t1 < work.times[-1] or work.times[work.next_report] < t1:
         work.rhs_count += 1
         rhs(t1, trial, rates, system, loops)
         if not all_finite(rates):
-            work.t_stop, work.status = t1, NOT_FINITE
+            work.t_stop, work.status = t1, at.NOT_FINITE
             return False
     return not (watched and end_is_across(work, t1, rates, watch, system, loops))
 
@@ -394,7 +380,12 @@ def complete_step(
 def accept(work: AdamsState, t1: float, k: int, here: float, below: float, lower: bool) -> None:
     """Make the trial state the state; its differences; order and length of what comes."""
     star, f = work.scaled, work.differences
-    y, trial, total, rates = work.state[Y], work.state[TRIAL], work.state[SCRATCH], star[ROWS - 1]
+    y, trial, total, rates = (
+        work.state[at.Y],
+        work.state[at.TRIAL],
+        work.state[at.SCRATCH],
+        star[ROWS - 1],
+    )
     h = t1 - work.t
     for i in range(y.size):
         y[i] = trial[i]
@@ -427,13 +418,13 @@ def plan(work: AdamsState, h: float, k: int, here: float, below: float, lower: b
     elif lower:
         order, error = k - 1, below
     elif work.equal_steps > k:
-        y = work.state[Y]
-        highest = work.state[OTHER]
+        y = work.state[at.Y]
+        highest = work.state[at.OTHER]
         for i in range(y.size):
             highest[i] = h * f[k + 1, i]
         size = work.error_size
         above = work.table[CONSTANT, k + 1] * scaled_largest(
-            work.state[SCRATCH], highest, y, y, size, work.rtol, work.tolerance, h
+            work.state[at.SCRATCH], highest, y, y, size, work.rtol, work.tolerance, h
         )
         if k > 1 and below <= min(here, above):
             order, error = k - 1, below

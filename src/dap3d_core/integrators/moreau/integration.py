@@ -26,13 +26,9 @@ from dap3d_core.integrators.moreau.free_motion import MOST_PARTS, PART
 from dap3d_core.integrators.moreau.impulses import log_contacts, put_means
 from dap3d_core.integrators.moreau.problem import arrays_of
 from dap3d_core.integrators.moreau.step import FOLLOWED, MOST_STEPS, START_ALONE, advance
+from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration import Integration
-from dap3d_core.integrators.stepping.integration_state import (
-    OTHER,
-    RUNNING,
-    IntegrationState,
-    Y,
-)
+from dap3d_core.integrators.stepping.integration_state import IntegrationState
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.array_struct import Matrix, Scalar
 
@@ -128,10 +124,10 @@ class MoreauIntegration(Integration):
     def state_within(self, t: float) -> Floats | None:
         """As ``Integration.state_within``, linear."""
         work = self.work
-        if work.status != RUNNING or not work.t_dense < t <= work.t_dense + work.h_dense:
+        if work.status != at.RUNNING or not work.t_dense < t <= work.t_dense + work.h_dense:
             return None
         part = (t - work.t_dense) / work.h_dense
-        found: Floats = (1.0 - part) * work.state[OTHER] + part * work.state[Y]
+        found: Floats = (1.0 - part) * work.state[at.OTHER] + part * work.state[at.Y]
         return found
 
     def complete(self, row: Floats) -> None:

@@ -49,16 +49,8 @@ from dap3d_core.integrators.moreau.restitution import (
     put_falls,
     put_flies,
 )
-from dap3d_core.integrators.stepping.integration_state import (
-    DRIVEN,
-    NO_ROOM,
-    NOT_FINITE,
-    OTHER,
-    RUNNING,
-    TRIAL,
-    Function,
-    Y,
-)
+from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.integrators.stepping.integration_state import Function
 from dap3d_core.integrators.stepping.output import may_step, project_state
 from dap3d_core.integrators.stepping.step_control import count_turns, end_of_step
 from dap3d_core.integrators.stepping.vector_ops import all_finite, copy
@@ -98,7 +90,7 @@ def advance(
     Or room is missing: ``stage`` says so.
     """
     limit = work.rhs_count + budget
-    if s.stage == 0 and work.next_report == 0 and work.status == RUNNING and s.is_exported == 0:
+    if s.stage == 0 and work.next_report == 0 and work.status == at.RUNNING and s.is_exported == 0:
         s.stage = START
     if s.stage >= START:
         is_alone = s.stage == START_ALONE
@@ -110,8 +102,8 @@ def advance(
         if s.stage == 0:
             fly(work, s, functions[0], system, loops)
             s.stage = FREE
-            if not all_finite(work.state[TRIAL]):
-                work.t_stop, work.status, s.stage = s.t1, NOT_FINITE, 0
+            if not all_finite(work.state[at.TRIAL]):
+                work.t_stop, work.status, s.stage = s.t1, at.NOT_FINITE, 0
                 return
         if s.stage == FREE:
             if not meet(work, s, system, loops):
@@ -124,7 +116,7 @@ def advance(
         s.stage = 0
         finish(work, s, functions, system, loops)
     if s.stage != 0 and s.is_exported != 0:
-        work.t_stop, work.status, s.stage = s.t1, NO_ROOM, 0
+        work.t_stop, work.status, s.stage = s.t1, at.NO_ROOM, 0
 
 
 @compiled
@@ -136,7 +128,7 @@ def push_at_start(work: Any, s: StepArrays, rhs: Function, system: System, loops
     count, row = work.rhs_count, work.next_report
     work.next_report, work.step_limit = 1, math.inf
     fly(work, s, rhs, system, loops)
-    has_room = not all_finite(work.state[TRIAL]) or meet(work, s, system, loops)
+    has_room = not all_finite(work.state[at.TRIAL]) or meet(work, s, system, loops)
     work.rhs_count, work.next_report = count, row
     work.segment_step_count, work.largest_residual = 0, 0.0
     return has_room
@@ -191,13 +183,13 @@ def goes_on(
 @compiled
 def state_at(work: Any, t: float, y: Floats) -> None:
     """The state reached: steps end where something is reported."""
-    copy(y, work.state[Y])
+    copy(y, work.state[at.Y])
 
 
 @compiled
 def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     """Find impulses of contacts, and velocities ``end`` behind them; False without room."""
-    y, trial, n = work.state[Y], work.state[TRIAL], s.mass.size - 1
+    y, trial, n = work.state[at.Y], work.state[at.TRIAL], s.mass.size - 1
     take_velocities(y, n, s.before)
     take_velocities(trial, n, s.free)
     for b in range(1, n + 1 if work.pushed[0, 0] != 0.0 else 1):
@@ -220,7 +212,7 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         return True
     any_collides = put_bias(s)
     if s.declared_law.size > 0 and not find_grips(work.t, s, system, loops):
-        work.t_stop, work.status, s.stage = work.t, DRIVEN, 0
+        work.t_stop, work.status, s.stage = work.t, at.DRIVEN, 0
         return False
     order_memory(work.memory, s.slots)
     turns = stay_closed(work, s)
@@ -268,7 +260,7 @@ def solve_fitted(work: Any, s: StepArrays, turns: bool, system: System, loops: A
 @compiled
 def carry_on(work: Any, s: StepArrays) -> None:
     """Move the bodies that contacts or joints act on as they do, as the trial state."""
-    y, trial, h, goes = work.state[Y], work.state[TRIAL], s.h, s.queue
+    y, trial, h, goes = work.state[at.Y], work.state[at.TRIAL], s.h, s.queue
     put_falls(s)
     mark_moved(work, s, goes)
     for b in range(1, s.end.shape[0]):
@@ -381,7 +373,7 @@ def speed_at(s: StepArrays, b: int) -> float:
 @compiled
 def put_middle(work: Any, s: StepArrays) -> Floats:
     """The state halfway to that expected at the end of the step."""
-    y, trial, size = work.state[Y], work.state[TRIAL], work.state.shape[1]
+    y, trial, size = work.state[at.Y], work.state[at.TRIAL], work.state.shape[1]
     middle = s.slopes[:size]
     for i in range(size):
         middle[i] = 0.5 * (y[i] + trial[i])
@@ -436,7 +428,7 @@ def part(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
 
     False without room.
     """
-    trial, deepest, margin = work.state[TRIAL], 0.0, 0.5 * LEAST_MARGIN * s.length
+    trial, deepest, margin = work.state[at.TRIAL], 0.0, 0.5 * LEAST_MARGIN * s.length
     for b in range(s.margin.size):
         s.margin[b] = margin
     for _ in range(PASSES):
@@ -470,22 +462,22 @@ def part(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
 @compiled
 def finish(work: Any, s: StepArrays, functions: Any, system: System, loops: Any) -> None:
     """Make the trial state that of the end of the step."""
-    y, trial = work.state[Y], work.state[TRIAL]
+    y, trial = work.state[at.Y], work.state[at.TRIAL]
     if s.is_solved != 0 and s.is_steady == 0 and s.first_state < y.size:
         follow_states(work, s, functions[0], system, loops)
     if s.is_solved != 0:
         give_velocities(trial, s.end)
     work.segment_step += 1 if s.t1 >= end_of_step(work) else 0
-    copy(work.state[OTHER], y)
+    copy(work.state[at.OTHER], y)
     copy(y, trial)
     work.t_dense, work.h_dense, work.t = work.t, s.h, s.t1
     work.step_count += 1
-    failure = RUNNING
+    failure = at.RUNNING
     if not all_finite(y):
-        failure = NOT_FINITE
+        failure = at.NOT_FINITE
     elif s.y.size > 0:
         failure = project_state(work, work.t, y, functions[1], system, loops)
-    if failure != RUNNING:
+    if failure != at.RUNNING:
         work.t_stop, work.status = s.t1, failure
     elif work.calls_accepted != 0:
         count_turns(work, functions[3], system, loops)

@@ -20,23 +20,14 @@ from dap3d_core.integrators.radau.newton import SAME_STEP, method_index, most_it
 from dap3d_core.integrators.radau.order import change_order, lower_order, raise_order
 from dap3d_core.integrators.radau.state import OLD, OLD_SLOPE, SLOPE, TRIAL_SLOPE, Given, RadauState
 from dap3d_core.integrators.radau.tableau import FEWEST
+from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.event_location import (
     end_is_across,
     is_sample_across,
     next_length,
     update_switches_after_step,
 )
-from dap3d_core.integrators.stepping.integration_state import (
-    ABSOLUTE,
-    FOUND,
-    NOT_FINITE,
-    RUNNING,
-    SCRATCH,
-    STEP_FLOOR,
-    TRIAL,
-    Function,
-    Y,
-)
+from dap3d_core.integrators.stepping.integration_state import Function
 from dap3d_core.integrators.stepping.output import may_step, needs_dense, project_state
 from dap3d_core.integrators.stepping.rounding import can_measure, record_failure
 from dap3d_core.integrators.stepping.step_control import (
@@ -107,14 +98,14 @@ def advance(
 @compiled
 def start(work: RadauState, rhs: Function, project: Function, system: System, loops: Any) -> None:
     """Project the state where a motion starts, and compute its rates and multipliers."""
-    y = work.state[Y]
+    y = work.state[at.Y]
     failure = project_state(work, work.t, y, project, system, loops)
-    if failure == RUNNING:
+    if failure == at.RUNNING:
         work.rhs_count += 1
         rhs(work.t, y, work.k[0], system, loops)
         if not all_finite(work.k[0]):
-            failure = NOT_FINITE
-    if failure != RUNNING:
+            failure = at.NOT_FINITE
+    if failure != at.RUNNING:
         work.t_stop, work.status = work.t, failure
         return
     change_order(work, FEWEST)
@@ -153,22 +144,22 @@ def step(
     if work.switch_count != 0 and stage_is_across(work, t, h, watch, system, loops):
         return
     for k in range(state.shape[1]):
-        state[TRIAL, k] = state[Y, k] + work.Z[work.stages - 1, k]
+        state[at.TRIAL, k] = state[at.Y, k] + work.Z[work.stages - 1, k]
     error = estimate_error(t, h, work, given) if adaptive else 0.0
     if error < 1.0:
         find_work(t, h, work, given)
-        failure = project_state(work, t1, state[TRIAL], project, system, loops)
-        if failure == RUNNING:
+        failure = project_state(work, t1, state[at.TRIAL], project, system, loops)
+        if failure == at.RUNNING:
             find_slope(t, h, work, given)
             failure = complete_step(work, t1, h, watch, system, loops)
-        if failure == RUNNING:
+        if failure == at.RUNNING:
             failure = judge_turns(work, t1, accepted, system, loops)
         if failure == STEP_CUT:
             return
-        if failure == RUNNING and adaptive and lands_near_singularity(work, t1):
+        if failure == at.RUNNING and adaptive and lands_near_singularity(work, t1):
             work.near_singular_landings += 1
-            reject(work, t1, h * STEP_AFTER_SINGULAR_END, STEP_FLOOR)
-        elif failure == RUNNING:
+            reject(work, t1, h * STEP_AFTER_SINGULAR_END, at.STEP_FLOOR)
+        elif failure == at.RUNNING:
             work.near_singular_landings = 0
             accept(work, t1, h, error)
             update_switches_after_step(work, h, longest, end)
@@ -177,7 +168,7 @@ def step(
     elif error <= LARGEST:
         reject_error(work, t1, h, error)
     else:
-        reject(work, t1, h * STEP_AFTER_FAILURE, NOT_FINITE)
+        reject(work, t1, h * STEP_AFTER_FAILURE, at.NOT_FINITE)
 
 
 @compiled
@@ -185,10 +176,10 @@ def stage_is_across(
     work: RadauState, t: float, h: float, watch: Function, system: System, loops: Any
 ) -> bool:
     """True if an inner stage lies beyond a switch; then the step is cut."""
-    x, c = work.state[SCRATCH], work.method.c[method_index(work.stages)]
+    x, c = work.state[at.SCRATCH], work.method.c[method_index(work.stages)]
     for i in range(work.stages - 1):
         for k in range(x.shape[0]):
-            x[k] = work.state[Y, k] + work.Z[i, k]
+            x[k] = work.state[at.Y, k] + work.Z[i, k]
         if is_sample_across(work, t + c[i] * h, x, watch, system, loops):
             return True
     return False
@@ -234,14 +225,14 @@ def reject_iteration(work: RadauState, t1: float, h: float, shorter: float) -> N
     stale = work.tangent_is_current == 0
     work.tangent_needed = 1
     if not shorter > 0.0:  # NaN
-        reject(work, t1, h * STEP_AFTER_FAILURE, NOT_FINITE)
+        reject(work, t1, h * STEP_AFTER_FAILURE, at.NOT_FINITE)
     elif work.fixed_step == 0.0 or not stale:
         if not is_at_rounding(work.state_change, work.newton_limit, work):
             record_failure(work, work.state_change, h, work.last_rejected != 0)
         blame(work, h)
         again = work.last_rejected
-        reject(work, t1, h * shorter, STEP_FLOOR)
-        if work.status == RUNNING and lower_order(work, again) and work.regularisation != 0.0:
+        reject(work, t1, h * shorter, at.STEP_FLOOR)
+        if work.status == at.RUNNING and lower_order(work, again) and work.regularisation != 0.0:
             # off the constraints dependent rows hold the motion, and their multipliers are no start
             work.first_stage_valid, work.h = 0, 0.0
 
@@ -253,7 +244,7 @@ def reject_error(work: RadauState, t1: float, h: float, error: float) -> None:
     work.error_refusals += 1
     factor = max(SHRINKAGE, safety_factor(work) / error ** (1.0 / (work.stages + 1)))
     lower_order(work, work.last_rejected)
-    reject(work, t1, h * factor, STEP_FLOOR)
+    reject(work, t1, h * factor, at.STEP_FLOOR)
     if work.has_last_step == 0:
         work.h = min(work.h, 0.1 * h)
     work.tangent_needed = max(work.tangent_needed, 1 - work.tangent_is_current)
@@ -269,7 +260,7 @@ def blame(work: RadauState, h: float) -> None:
     worst, largest = 0, -1.0
     for i in range(work.stages):
         for k in range(work.error_size):
-            scale = work.tolerance[ABSOLUTE, k] + work.rtol * abs(work.state[Y, k])
+            scale = work.tolerance[at.ABSOLUTE, k] + work.rtol * abs(work.state[at.Y, k])
             size = abs(work.R[i, k]) / scale
             if size > largest:
                 worst, largest = k, size
@@ -290,14 +281,14 @@ def complete_step(
     """Prepare dense output where a reporting time lies in the step; the failure, or RUNNING."""
     slope = work.state[TRIAL_SLOPE]
     if not all_finite(slope):
-        return NOT_FINITE
+        return at.NOT_FINITE
     if work.switch_count != 0:
-        evaluate(work, t1, work.state[TRIAL], FOUND, watch, system, loops)
+        evaluate(work, t1, work.state[at.TRIAL], at.FOUND, watch, system, loops)
         if end_is_across(work, t1, slope, watch, system, loops):
             return STEP_CUT
     if needs_dense(work, t1):
         prepare_dense(h, work)
-    return RUNNING
+    return at.RUNNING
 
 
 @compiled
@@ -305,7 +296,7 @@ def accept(work: RadauState, t1: float, h: float, error: float) -> None:
     """Make the trial state the state; choose the next step (Gustafsson's control, HW IV.8)."""
     state = work.state
     for k in range(state.shape[1]):
-        state[OLD, k], state[Y, k] = state[Y, k], state[TRIAL, k]
+        state[OLD, k], state[at.Y, k] = state[at.Y, k], state[at.TRIAL, k]
         state[OLD_SLOPE, k], state[SLOPE, k] = state[SLOPE, k], state[TRIAL_SLOPE, k]
         for i in range(work.stages):
             work.Z_old[i, k] = work.Z[i, k]

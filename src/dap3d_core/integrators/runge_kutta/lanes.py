@@ -12,17 +12,9 @@ import attrs
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.runge_kutta.step import find_first_stage, finish_step, step, step_error
 from dap3d_core.integrators.runge_kutta.sums import ABSCISSA, combine
+from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.event_location import is_cut_at_sample, next_length
-from dap3d_core.integrators.stepping.integration_state import (
-    GIVEN,
-    OTHER,
-    PROJECTED,
-    SAMPLE,
-    SCRATCH,
-    TRIAL,
-    Function,
-    Y,
-)
+from dap3d_core.integrators.stepping.integration_state import Function
 from dap3d_core.integrators.stepping.output import dense_state, may_step
 from dap3d_core.integrators.stepping.rounding import update_rounding
 from dap3d_core.integrators.stepping.singular_poses import (
@@ -109,8 +101,8 @@ def put_stage(work: RungeKuttaState, lanes: Lanes, k: int, i: int) -> int:
     """State of a stage, and as the argument of the right-hand side; 1 where that is wanted."""
     t1, table, stages = lanes.end[k], work.table, work.stage_count
     h, c = lanes.length[k], table[i, ABSCISSA]
-    x = work.state[TRIAL] if i == stages else work.state[SCRATCH]
-    combine(x, 1.0, work.state[Y], h, table, i, work.k)
+    x = work.state[at.TRIAL] if i == stages else work.state[at.SCRATCH]
+    combine(x, 1.0, work.state[at.Y], h, table, i, work.k)
     if i == stages and work.error_uses_last_stage == 0:
         return 0
     put_argument(lanes, k, t1 if c == 1.0 else work.t + c * h, x)
@@ -124,7 +116,7 @@ def begin_stage(work: RungeKuttaState, lanes: Lanes, k: int) -> int:
     The switches are in ``SAMPLE``, without bands.
     """
     if work.sampled_switch_count != 0:
-        count_from_far_edges(work.switches, SAMPLE)
+        count_from_far_edges(work.switches, at.SAMPLE)
         if is_cut_at_sample(work, lanes.t[k]):
             lanes.does[k] = CUT
             return 0
@@ -135,7 +127,7 @@ def begin_stage(work: RungeKuttaState, lanes: Lanes, k: int) -> int:
 @compiled
 def argument_of(work: RungeKuttaState, lanes: Lanes, k: int) -> Floats:
     """The state at which a lane wants its rates, for a function of one scene."""
-    argument = work.state[OTHER]
+    argument = work.state[at.OTHER]
     for j in range(argument.shape[0]):
         argument[j] = lanes.y[j, k]
     return argument
@@ -159,7 +151,7 @@ def judge_step(
     if work.fixed_step != 0.0 or work.error_uses_last_stage != 0 or not lanes.error[k] <= 1.0:
         return 0
     lanes.does[k] = HAS_RATES
-    put_argument(lanes, k, t1, work.state[TRIAL])
+    put_argument(lanes, k, t1, work.state[at.TRIAL])
     return 1
 
 
@@ -168,7 +160,7 @@ def take_projection(work: RungeKuttaState, lanes: Lanes, k: int) -> None:
     """The projected trial state of a lane, where it is that of its run alone."""
     if lanes.bound[k] < 1.0:
         work.is_projected = 1
-        given, outcome = work.state[GIVEN], work.real[PROJECTED:]
+        given, outcome = work.state[at.GIVEN], work.real[at.PROJECTED :]
         for j in range(given.shape[0]):
             given[j] = lanes.y[j, k]
         for j in range(outcome.shape[0]):

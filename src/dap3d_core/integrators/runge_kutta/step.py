@@ -32,24 +32,14 @@ from dap3d_core.integrators.runge_kutta.sums import (
     error_beyond_rounding,
     error_norm,
 )
+from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.event_location import (
     end_is_across,
     is_sample_across,
     next_length,
     update_switches_after_step,
 )
-from dap3d_core.integrators.stepping.integration_state import (
-    FOUND,
-    GIVEN,
-    NOT_FINITE,
-    OTHER,
-    RUNNING,
-    SCRATCH,
-    STEP_FLOOR,
-    TRIAL,
-    Function,
-    Y,
-)
+from dap3d_core.integrators.stepping.integration_state import Function
 from dap3d_core.integrators.stepping.output import dense_state, may_step, needs_dense, project_state
 from dap3d_core.integrators.stepping.rounding import record_failure, update_rounding
 from dap3d_core.integrators.stepping.singular_poses import (
@@ -186,17 +176,17 @@ def finish_step(
     accepted = functions[2]
     if error <= 1.0:
         failure = complete_step(work, t1, near, has_rates, functions, system, loops)
-        if failure == RUNNING:
+        if failure == at.RUNNING:
             failure = judge_turns(work, t1, accepted, system, loops)
         if failure == STEP_CUT:
             return
         other = 0.0
-        if failure == RUNNING and work.fixed_step == 0.0 and not near:
+        if failure == at.RUNNING and work.fixed_step == 0.0 and not near:
             other = step_elsewhere(work, t1, h)
         if other > 0.0:
             work.near_singular_landings += 1
-            reject(work, t1, other, STEP_FLOOR)
-        elif failure == RUNNING:
+            reject(work, t1, other, at.STEP_FLOOR)
+        elif failure == at.RUNNING:
             work.near_singular_landings = 0
             if time_to_singularity(work, h) < h:
                 work.error_across_singularity = 0.0
@@ -207,9 +197,9 @@ def finish_step(
             reject(work, t1, h * STEP_AFTER_FAILURE, failure)
     elif error <= LARGEST:
         record_failure(work, error, h, work.last_rejected != 0)
-        reject(work, t1, h * step_reduction(work, error), STEP_FLOOR)
+        reject(work, t1, h * step_reduction(work, error), at.STEP_FLOOR)
     else:
-        reject(work, t1, h * STEP_AFTER_FAILURE, NOT_FINITE)
+        reject(work, t1, h * STEP_AFTER_FAILURE, at.NOT_FINITE)
 
 
 @compiled
@@ -235,11 +225,11 @@ def step_elsewhere(work: RungeKuttaState, t1: float, h: float) -> float:
 def find_first_stage(work: RungeKuttaState, rhs: Function, system: Any, loops: Any) -> bool:
     """Evaluate f at the state; False where it is not finite, which ends the run."""
     work.rhs_count += 1
-    rhs(work.t, work.state[Y], work.k[0], system, loops)
+    rhs(work.t, work.state[at.Y], work.k[0], system, loops)
     work.first_stage_valid = 1
     if all_finite(work.k[0]):
         return True
-    work.t_stop, work.status = work.t, NOT_FINITE
+    work.t_stop, work.status = work.t, at.NOT_FINITE
     return False
 
 
@@ -266,14 +256,14 @@ def take_stages(
     stages, watched = work.stage_count, work.switch_count != 0
     last = stages if work.error_uses_last_stage != 0 else stages - 1
     for i in range(1, stages + 1):
-        x = work.state[TRIAL] if i == stages else work.state[SCRATCH]
-        combine(x, 1.0, work.state[Y], h, table, i, k)
+        x = work.state[at.TRIAL] if i == stages else work.state[at.SCRATCH]
+        combine(x, 1.0, work.state[at.Y], h, table, i, k)
         if i <= last:
             c = table[i, ABSCISSA]
             t = t1 if c == 1.0 else work.t + c * h
             if near:
                 project_stage(work, t, x, project, system, loops)
-                x = work.state[SCRATCH]
+                x = work.state[at.SCRATCH]
                 if cut_at_stage(work, t, t1):
                     return False
             if watched and is_sample_across(work, t, x, watch, system, loops):
@@ -295,9 +285,9 @@ def cut_at_stage(work: RungeKuttaState, t: float, t1: float) -> bool:
         return False
     if work.fixed_step != 0.0:
         return False
-    h, jump = t1 - work.t, projection_jump(work, work.state[OTHER], work.state[SCRATCH])
+    h, jump = t1 - work.t, projection_jump(work, work.state[at.OTHER], work.state[at.SCRATCH])
     if not jump <= 1.0:
-        reject(work, t1, h * max(work.factor_min, work.safety / math.sqrt(jump)), STEP_FLOOR)
+        reject(work, t1, h * max(work.factor_min, work.safety / math.sqrt(jump)), at.STEP_FLOOR)
         return True
     has_choice = t1 + step_floor(work) < work.step_limit
     if work.near_singular_landings >= SINGULAR_END_ATTEMPTS or not has_choice:
@@ -305,14 +295,14 @@ def cut_at_stage(work: RungeKuttaState, t: float, t1: float) -> bool:
     if not record_singularity(work, t - work.t):
         return False
     work.near_singular_landings += 1
-    reject(work, t1, h, STEP_FLOOR)
+    reject(work, t1, h, at.STEP_FLOOR)
     return True
 
 
 @compiled
 def projection_jump(work: RungeKuttaState, before: Floats, after: Floats) -> float:
     """The change of a state by projection, in parts of what it may be in a step."""
-    y, jump = work.state[Y], 0.0
+    y, jump = work.state[at.Y], 0.0
     for i in range(work.error_size):
         largest = MAX_PROJECTION * (1.0 + max(abs(y[i]), abs(after[i])))
         ratio = abs(after[i] - before[i]) / largest
@@ -325,9 +315,9 @@ def project_stage(
     work: RungeKuttaState, t: float, x: Floats, project: Function, system: Any, loops: Any
 ) -> None:
     """Project the state x of a stage into the scratch row (x may be that); as it was: OTHER."""
-    argument = work.state[SCRATCH]
-    copy(work.state[OTHER], x)
-    copy(argument, work.state[OTHER])  # which x may be
+    argument = work.state[at.SCRATCH]
+    copy(work.state[at.OTHER], x)
+    copy(argument, work.state[at.OTHER])  # which x may be
     project_state(work, t, argument, project, system, loops)
 
 
@@ -341,8 +331,8 @@ def projected_error_norm(
     over the square of the distance: errors below POSITION_NOISE do not count.
     """
     table, k = work.table, work.k
-    y, trial, result, other = (work.state[Y], work.state[TRIAL], work.state[SCRATCH],
-                               work.state[OTHER])  # fmt: skip
+    y, trial, result, other = (work.state[at.Y], work.state[at.TRIAL], work.state[at.SCRATCH],
+                               work.state[at.OTHER])  # fmt: skip
     project_stage(work, t1, trial, project, system, loops)
     jump = projection_jump(work, trial, result)
     if not jump <= 1.0:
@@ -355,7 +345,7 @@ def projected_error_norm(
         project_state(work, t1, other, project, system, loops)
         for i in range(other.size):
             other[i] -= result[i]
-        size = scaled_largest(work.state[GIVEN], other, y, result, work.error_size, work.rtol,
+        size = scaled_largest(work.state[at.GIVEN], other, y, result, work.error_size, work.rtol,
                               work.tolerance, h, least)  # fmt: skip
         main = size if e == 0 else combined_error(main, size)
     return main
@@ -392,7 +382,7 @@ def complete_step(
     """
     times, k = work.times, work.k
     rhs, project, _, watch = functions
-    trial, result = work.state[TRIAL], work.stage_count
+    trial, result = work.state[at.TRIAL], work.stage_count
     known, watched = work.error_uses_last_stage != 0, work.switch_count != 0
     here, controlled = known and not near, work.fixed_step == 0.0 and not near
     if needs_dense(work, t1):
@@ -413,24 +403,24 @@ def complete_step(
         known = here = True
     if controlled and known:
         detect_stiffness(work, t1 - work.t)
-    copy(work.state[OTHER], trial)
+    copy(work.state[at.OTHER], trial)
     failure = project_state(work, t1, trial, project, system, loops, here)
-    if failure != RUNNING:
+    if failure != at.RUNNING:
         return failure
     if known and work.projection_moved != 0.0:
         known = controlled and is_within_error(work)
     if watched:  # before f, which is known where multipliers have been found for switches
-        evaluate(work, t1, trial, FOUND, watch, system, loops)
+        evaluate(work, t1, trial, at.FOUND, watch, system, loops)
     if not known and (watched or t1 < times[-1]):
         work.rhs_count += 1
         rhs(t1, trial, k[result], system, loops)
         known = True
     if known and not all_finite(k[result]):
-        return NOT_FINITE
+        return at.NOT_FINITE
     if watched and end_is_across(work, t1, k[result], watch, system, loops):
         return STEP_CUT
     work.first_stage_valid = 1 if known else 0
-    return RUNNING
+    return at.RUNNING
 
 
 @compiled
@@ -438,27 +428,27 @@ def take_dense_stages(
     work: RungeKuttaState, t1: float, near: bool, functions: Any, system: Any, loops: Any
 ) -> bool:
     """The further stages that dense output needs; False as for ``take_stages``."""
-    t, argument, table, k = work.t, work.state[SCRATCH], work.table, work.k
+    t, argument, table, k = work.t, work.state[at.SCRATCH], work.table, work.k
     rhs, project, _, watch = functions
     watched = work.switch_count != 0
     for i in range(work.stage_count + 1, k.shape[0]):
-        at = t + table[i, ABSCISSA] * (t1 - t)
-        combine(argument, 1.0, work.state[Y], t1 - t, table, i, k)
+        instant = t + table[i, ABSCISSA] * (t1 - t)
+        combine(argument, 1.0, work.state[at.Y], t1 - t, table, i, k)
         if near:
-            project_stage(work, at, argument, project, system, loops)
-            if cut_at_stage(work, at, t1):
+            project_stage(work, instant, argument, project, system, loops)
+            if cut_at_stage(work, instant, t1):
                 return False
-        if watched and is_sample_across(work, at, argument, watch, system, loops):
+        if watched and is_sample_across(work, instant, argument, watch, system, loops):
             return False
-        rhs(at, argument, k[i], system, loops)
+        rhs(instant, argument, k[i], system, loops)
     return True
 
 
 @compiled
 def is_within_error(work: RungeKuttaState) -> bool:
     """True if the trial state differs from the other one by no more than a step may err."""
-    y, trial, other = work.state[Y], work.state[TRIAL], work.state[OTHER]
-    ratios = work.state[SCRATCH]
+    y, trial, other = work.state[at.Y], work.state[at.TRIAL], work.state[at.OTHER]
+    ratios = work.state[at.SCRATCH]
     for i in range(other.size):
         other[i] -= trial[i]
     size = work.error_size
@@ -471,12 +461,12 @@ def prepare_dense(work: RungeKuttaState, t1: float) -> None:
     state, k, terms = work.state, work.k, work.terms
     h, result = t1 - work.t, work.stage_count
     for i in range(state.shape[1]):
-        rise = state[TRIAL, i] - state[Y, i]
-        terms[0, i] = state[Y, i]
+        rise = state[at.TRIAL, i] - state[at.Y, i]
+        terms[0, i] = state[at.Y, i]
         terms[1, i] = rise
         terms[2, i] = h * k[0, i] - rise
         terms[3, i] = rise - h * k[result, i] - terms[2, i]
     first = k.shape[0] + work.estimate_count
     for row in range(4, terms.shape[0]):
-        combine(terms[row], 0.0, state[Y], h, work.table, first + row - 4, k)
+        combine(terms[row], 0.0, state[at.Y], h, work.table, first + row - 4, k)
     work.t_dense, work.h_dense = work.t, h

@@ -10,19 +10,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dap3d_core.integrators.stepping.integration_state import (
-    INSTANT,
-    SIDE,
-    STOP_ROWS,
-    IntegrationState,
-)
+from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.integrators.stepping.integration_state import IntegrationState
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
 
 def stop_table(stops: Sequence[tuple[float, bool]], *, is_adaptive: bool) -> Floats:
     """``IntegrationState.stops`` of instants in ascending order, and whether rates jump there."""
-    table = np.empty((STOP_ROWS, len(stops)))
+    table = np.empty((at.STOP_ROWS, len(stops)))
     for k, (t, jumps) in enumerate(stops):
         ends = (-np.inf, np.inf) if jumps and is_adaptive else (t, t)
         table[:, k] = np.nextafter(t, ends[0]), t, np.nextafter(t, ends[1])
@@ -37,7 +33,7 @@ def restart(work: IntegrationState) -> None:
     work.first_stage_valid = work.switch_rates_valid = 0
     work.last_rejected = work.cut_attempts = 0
     for q in range(work.switches.shape[1]):
-        work.switches[SIDE, q] = 0.0
+        work.switches[at.SIDE, q] = 0.0
 
 
 @compiled
@@ -46,7 +42,7 @@ def next_stop(work: IntegrationState) -> int:
     first, end = 0, work.stops.shape[1]
     while first < end:
         middle = (first + end) // 2
-        if work.stops[INSTANT, middle] < work.t:
+        if work.stops[at.INSTANT, middle] < work.t:
             first = middle + 1
         else:
             end = middle

@@ -20,28 +20,8 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import ENDS, JUMPS, MODE_ENDS, UNSEEN
-from dap3d_core.integrators.stepping.integration_state import (
-    BAND,
-    BEND,
-    CHATTERED,
-    COUNT,
-    CROSSED,
-    DOES,
-    FOUND,
-    FOUND_RATE,
-    JUMPED,
-    RATE,
-    RUNNING,
-    SAMPLE,
-    SIDE,
-    SINCE,
-    SWITCHED,
-    TRIAL,
-    VALUE,
-    Function,
-    IntegrationState,
-    Y,
-)
+from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.integrators.stepping.integration_state import Function, IntegrationState
 from dap3d_core.integrators.stepping.output import project_state
 from dap3d_core.integrators.stepping.step_control import EPSILON, FLOOR
 from dap3d_core.integrators.stepping.switch_values import (
@@ -134,10 +114,10 @@ def distance_to_crossing(work: IntegrationState, h: float, short: float) -> floa
     """
     s, longest = work.switches, h
     for k in range(s.shape[1]):
-        side = s[SIDE, k]
+        side = s[at.SIDE, k]
         if side == 0.0:
             continue
-        value, rate, bend = side * s[VALUE, k], side * s[RATE, k], side * s[BEND, k]
+        value, rate, bend = side * s[at.VALUE, k], side * s[at.RATE, k], side * s[at.BEND, k]
         if may_rest(s, k) and value + short * rate >= 0.0:
             continue  # its rate is rounding
         left = time_to_zero(value - near_edge(s, k), rate, bend)
@@ -156,7 +136,7 @@ def is_sample_across(
     """True if a state within a step lies across a switch; then the step is cut."""
     if work.sampled_switch_count == 0:
         return False
-    evaluate(work, t, x, SAMPLE, watch, system, loops)
+    evaluate(work, t, x, at.SAMPLE, watch, system, loops)
     return is_cut_at_sample(work, t)
 
 
@@ -170,11 +150,11 @@ def is_cut_at_sample(work: IntegrationState, t: float) -> bool:
     """
     s = work.switches
     for k in range(s.shape[1]):
-        if s[DOES, k] == UNSEEN or (s[DOES, k] == MODE_ENDS and may_rest(s, k)):
-            s[SAMPLE, k] = s[SIDE, k]
-    if not changes_sign(s, SAMPLE):
+        if s[at.DOES, k] == UNSEEN or (s[at.DOES, k] == MODE_ENDS and may_rest(s, k)):
+            s[at.SAMPLE, k] = s[at.SIDE, k]
+    if not changes_sign(s, at.SAMPLE):
         return False
-    cut_step(work, SAMPLE, t - work.t)
+    cut_step(work, at.SAMPLE, t - work.t)
     return True
 
 
@@ -184,8 +164,8 @@ def cut_step(work: IntegrationState, row: int, h: float) -> None:
     s = work.switches
     left = h
     for k in range(s.shape[1]):
-        side, edge = s[SIDE, k], near_edge(s, k)
-        value, rate, found = side * s[VALUE, k], side * s[RATE, k], side * s[row, k]
+        side, edge = s[at.SIDE, k], near_edge(s, k)
+        value, rate, found = side * s[at.VALUE, k], side * s[at.RATE, k], side * s[row, k]
         if side != 0.0 and found <= edge:
             bend = 2.0 * (found - value - rate * h) / (h * h)
             crosses = time_to_zero(value - edge, rate, bend)
@@ -205,18 +185,18 @@ def end_is_across(
 
     Then the step is cut. Its switches stand in row FOUND.
     """
-    s, trial, h = work.switches, work.state[TRIAL], t1 - work.t
-    if changes_sign(s, FOUND):
-        cut_step(work, FOUND, h)
+    s, trial, h = work.switches, work.state[at.TRIAL], t1 - work.t
+    if changes_sign(s, at.FOUND):
+        cut_step(work, at.FOUND, h)
         return True
-    find_switch_rates(work, t1, trial, slope, FOUND, FOUND_RATE, watch, system, loops)
+    find_switch_rates(work, t1, trial, slope, at.FOUND, at.FOUND_RATE, watch, system, loops)
     if work.cut_attempts >= MAX_SUSPICIONS:
         return False
     part = 1.0
     for k in range(s.shape[1]):
-        side = s[SIDE, k]
-        low = cubic_minimum(side * s[VALUE, k], h * side * s[RATE, k], side * s[FOUND, k],
-                            h * side * s[FOUND_RATE, k])  # fmt: skip
+        side = s[at.SIDE, k]
+        low = cubic_minimum(side * s[at.VALUE, k], h * side * s[at.RATE, k], side * s[at.FOUND, k],
+                            h * side * s[at.FOUND_RATE, k])  # fmt: skip
         if low < part:
             part, work.near_switch = low, k
     if part == 1.0:
@@ -273,14 +253,14 @@ def update_switches_after_step(
     if not is_short:
         work.near_switch = -1
     for k in range(s.shape[1]):
-        approaches = (s[SIDE, k] * s[RATE, k] < 0.0) | may_rest(s, k)  # or its rate is noise
-        is_same = abs(s[FOUND, k] - s[VALUE, k]) <= SAME * s[BAND, k]
+        approaches = (s[at.SIDE, k] * s[at.RATE, k] < 0.0) | may_rest(s, k)  # or its rate is noise
+        is_same = abs(s[at.FOUND, k] - s[at.VALUE, k]) <= SAME * s[at.BAND, k]
         stalled |= is_short & approaches & is_same & (k == work.near_switch)
-        s[BEND, k] = (s[FOUND_RATE, k] - s[RATE, k]) / h
-        s[VALUE, k], s[RATE, k] = s[FOUND, k], s[FOUND_RATE, k]
-        if s[SIDE, k] == 0.0:
-            s[SIDE, k] = np.sign(s[FOUND, k])
-            s[VALUE, k] += s[SIDE, k] * s[BAND, k]
+        s[at.BEND, k] = (s[at.FOUND_RATE, k] - s[at.RATE, k]) / h
+        s[at.VALUE, k], s[at.RATE, k] = s[at.FOUND, k], s[at.FOUND_RATE, k]
+        if s[at.SIDE, k] == 0.0:
+            s[at.SIDE, k] = np.sign(s[at.FOUND, k])
+            s[at.VALUE, k] += s[at.SIDE, k] * s[at.BAND, k]
     work.cut_attempts = 0
     work.stalled_steps = work.stalled_steps + 1 if stalled else 0
 
@@ -295,29 +275,29 @@ def bisect_crossing(
     t = work.t
     low, high, least = 0.0, h, 1e-3 * EPSILON * time_span(work)
     failure = euler_step(work, high, slope, project, watch, system, loops)
-    crossed = work.switch_count != 0 and is_across(s, FOUND)
+    crossed = work.switch_count != 0 and is_across(s, at.FOUND)
     if crossed:
         middle = 0.5 * high
-        while failure == RUNNING and t + low < t + middle < t + high and high - low > least:
+        while failure == at.RUNNING and t + low < t + middle < t + high and high - low > least:
             failure = euler_step(work, middle, slope, project, watch, system, loops)
-            if is_across(s, FOUND):
+            if is_across(s, at.FOUND):
                 high = middle
             else:
                 low = middle
             middle = 0.5 * (low + high)
-        if failure == RUNNING:
+        if failure == at.RUNNING:
             high = differentiated_crossing(work, high, slope, project, watch, system, loops)
             failure = euler_step(work, high, slope, project, watch, system, loops)
         record_crossings(work, t + high)
-        if failure == RUNNING and work.end_status == SWITCHED:
+        if failure == at.RUNNING and work.end_status == at.SWITCHED:
             high = with_slopes(low, high)
             failure = euler_step(work, high, slope, project, watch, system, loops)
-    if failure != RUNNING:
+    if failure != at.RUNNING:
         work.t_stop, work.status = t + high, failure
         return
     work.t = t + high
     for i in range(slope.shape[0]):
-        work.state[Y, i] = work.state[TRIAL, i]
+        work.state[at.Y, i] = work.state[at.TRIAL, i]
     work.step_count += 1
     if work.fixed_step != 0.0 and work.t >= end:
         work.segment_step += 1
@@ -325,15 +305,17 @@ def bisect_crossing(
     work.step_limit_at_switch = np.inf
     stays = 0
     for k in range(s.shape[1]):
-        if s[FOUND, k] == s[VALUE, k] and s[SIDE, k] * s[RATE, k] < 0.0:
+        if s[at.FOUND, k] == s[at.VALUE, k] and s[at.SIDE, k] * s[at.RATE, k] < 0.0:
             stays = 1  # a step to a crossing that changes no digit of its switch
-        if s[VALUE, k] == 0.0 and s[FOUND, k] == 0.0 and s[SIDE, k] != 0.0:
+        if s[at.VALUE, k] == 0.0 and s[at.FOUND, k] == 0.0 and s[at.SIDE, k] != 0.0:
             stays = 1
-            if work.stalled_steps >= MAX_STALLS_AT_ZERO and s[DOES, k] >= JUMPS:
-                s[SIDE, k] = s[CROSSED, k] = -s[SIDE, k]  # what follows at zero, jumps decide
+            if work.stalled_steps >= MAX_STALLS_AT_ZERO and s[at.DOES, k] >= JUMPS:
+                s[at.SIDE, k] = s[at.CROSSED, k] = -s[
+                    at.SIDE, k
+                ]  # what follows at zero, jumps decide
                 crossed = True
             elif work.stalled_steps >= MAX_STALLS_AT_ZERO:
-                s[SIDE, k] = 0.0  # it stays zero: it has no side until it leaves
+                s[at.SIDE, k] = 0.0  # it stays zero: it has no side until it leaves
     if crossed:
         work.stalled_steps = 0
     elif work.stalled_steps != 0 or stays != 0:
@@ -341,8 +323,8 @@ def bisect_crossing(
     if crossed:
         reset_step_control(work)
         for k in range(s.shape[1]):
-            if s[CROSSED, k] != 0.0 and work.end_status == 0:
-                work.status = JUMPED
+            if s[at.CROSSED, k] != 0.0 and work.end_status == 0:
+                work.status = at.JUMPED
 
 
 @compiled
@@ -359,12 +341,13 @@ def differentiated_crossing(
     s, count = work.switches, work.projection_count
     for _ in range(CROSSING_PASSES):
         euler_step(work, h, slope, project, watch, system, loops)
-        find_switch_rates(work, work.t + h, work.state[TRIAL], slope, FOUND, FOUND_RATE, watch,
+        y = work.state[at.TRIAL]
+        find_switch_rates(work, work.t + h, y, slope, at.FOUND, at.FOUND_RATE, watch,
                           system, loops)  # fmt: skip
         first = 0
         for k in range(s.shape[1]):
-            if first == 0 and s[FOUND, k] * s[SIDE, k] < 0.0 and s[FOUND_RATE, k] != 0.0:
-                h = with_slopes(h, h - s[FOUND, k] / s[FOUND_RATE, k])
+            if first == 0 and s[at.FOUND, k] * s[at.SIDE, k] < 0.0 and s[at.FOUND_RATE, k] != 0.0:
+                h = with_slopes(h, h - s[at.FOUND, k] / s[at.FOUND_RATE, k])
                 first = 1
     work.projection_count = count
     return h
@@ -376,12 +359,12 @@ def euler_step(
     system: Any, loops: Any,
 ) -> int:  # fmt: skip
     """The state after a very short time h, on its constraints, as trial state; its switches."""
-    t, y, trial = work.t + h, work.state[Y], work.state[TRIAL]
+    t, y, trial = work.t + h, work.state[at.Y], work.state[at.TRIAL]
     for i in range(y.shape[0]):
         trial[i] = y[i] + h * slope[i]
     failure = project_state(work, t, trial, project, system, loops)
-    if failure == RUNNING and work.switch_count != 0:
-        evaluate(work, t, trial, FOUND, watch, system, loops)
+    if failure == at.RUNNING and work.switch_count != 0:
+        evaluate(work, t, trial, at.FOUND, watch, system, loops)
     return failure
 
 
@@ -390,19 +373,21 @@ def record_crossings(work: IntegrationState, t: float) -> None:
     """Record sign changes of switches at t, and what follows: end, chatter, or another side."""
     s = work.switches
     for k in range(s.shape[1]):
-        if not s[FOUND, k] * s[SIDE, k] < 0.0:
+        if not s[at.FOUND, k] * s[at.SIDE, k] < 0.0:
             continue
-        s[SIDE, k] = -s[SIDE, k]
+        s[at.SIDE, k] = -s[at.SIDE, k]
         record_crossing(work, k, t)
-        if s[DOES, k] == ENDS and s[SIDE, k] < 0.0:
-            work.end_status, work.terminal_switch = SWITCHED, k
-        if s[DOES, k] >= JUMPS:
-            s[CROSSED, k] = s[SIDE, k]
-        if s[COUNT, k] == 0.0 or t - s[SINCE, k] > CHATTER_SPAN * (work.times[-1] - work.times[0]):
-            s[SINCE, k], s[COUNT, k] = t, 0.0
-        s[COUNT, k] += 1.0
-        if s[COUNT, k] > CHATTER and work.end_status == 0:
-            work.end_status, work.terminal_switch = CHATTERED, k
+        if s[at.DOES, k] == ENDS and s[at.SIDE, k] < 0.0:
+            work.end_status, work.terminal_switch = at.SWITCHED, k
+        if s[at.DOES, k] >= JUMPS:
+            s[at.CROSSED, k] = s[at.SIDE, k]
+        if s[at.COUNT, k] == 0.0 or t - s[at.SINCE, k] > CHATTER_SPAN * (
+            work.times[-1] - work.times[0]
+        ):
+            s[at.SINCE, k], s[at.COUNT, k] = t, 0.0
+        s[at.COUNT, k] += 1.0
+        if s[at.COUNT, k] > CHATTER and work.end_status == 0:
+            work.end_status, work.terminal_switch = at.CHATTERED, k
 
 
 @compiled

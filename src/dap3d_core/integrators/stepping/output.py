@@ -3,23 +3,9 @@
 from collections.abc import Callable
 from typing import Any
 
+from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.break_points import next_stop, restart
-from dap3d_core.integrators.stepping.integration_state import (
-    BEFORE,
-    BEHIND,
-    FINISHED,
-    GIVEN,
-    INSTANT,
-    NOT_FINITE,
-    PROJECTED,
-    PROJECTION_FAILED,
-    RUNNING,
-    STALLED,
-    STIFF,
-    TRIAL,
-    Function,
-    Y,
-)
+from dap3d_core.integrators.stepping.integration_state import Function
 from dap3d_core.integrators.stepping.vector_ops import all_finite, copy, interpolate
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
@@ -35,7 +21,13 @@ SLOW_STEP = 1e-7
 
 @compiled
 def project_state(
-    work: Any, t: float, y: Floats, project: Function, system: Any, loops: Any, here: bool = False
+    work: Any,
+    t: float,
+    y: Floats,
+    project: Function,
+    system: Any,
+    loops: Any,
+    here: bool = False,
 ) -> int:
     """Project y where that is on; the failure, or RUNNING.
 
@@ -44,19 +36,19 @@ def project_state(
     """
     work.projection_moved = 0.0
     if not all_finite(y):
-        return NOT_FINITE
+        return at.NOT_FINITE
     if work.projects == 0:
-        return RUNNING
-    outcome = work.real[PROJECTED:]
+        return at.RUNNING
+    outcome = work.real[at.PROJECTED :]
     work.projection_count += 1
     if here and work.is_projected != 0:
-        copy(y, work.state[GIVEN])
+        copy(y, work.state[at.GIVEN])
     else:
         outcome[0], outcome[1] = 1.0 if here else 0.0, 0.0
         project(t, y, outcome, system, loops)
     if outcome[1] == FAILED or not all_finite(y):
-        return PROJECTION_FAILED
-    return RUNNING
+        return at.PROJECTION_FAILED
+    return at.RUNNING
 
 
 @compiled
@@ -90,7 +82,7 @@ def may_step(
     from.
     """
     times = work.times
-    while work.status == RUNNING:
+    while work.status == at.RUNNING:
         if times[work.next_report] <= work.t:
             if not report_reached(work, state_at, project, report, system, loops):
                 return False
@@ -98,9 +90,9 @@ def may_step(
             if not report_end(work, report, system, loops):
                 return False
         elif work.stops_when_stiff != 0 and work.t_stiff < work.t:
-            work.status = STIFF
+            work.status = at.STIFF
         else:
-            work_done = abs(work.state[Y, work.state.shape[1] - 1])
+            work_done = abs(work.state[at.Y, work.state.shape[1] - 1])
             work.largest_work = max(work.largest_work, work_done)
             if work.rhs_count > limit:
                 return False
@@ -109,7 +101,7 @@ def may_step(
             if work.t >= work.step_limit:
                 return False
             pace = judge_pace(work)
-            if pace == RUNNING:
+            if pace == at.RUNNING:
                 return True
             work.t_stop, work.status = work.t, pace
     return False
@@ -127,18 +119,18 @@ def pass_stop(
     stops = work.stops
     work.step_limit = work.t_limit
     for k in range(next_stop(work), stops.shape[1]):
-        if work.t < stops[BEFORE, k]:
-            work.step_limit = min(work.t_limit, stops[BEFORE, k])
+        if work.t < stops[at.BEFORE, k]:
+            work.step_limit = min(work.t_limit, stops[at.BEFORE, k])
             return False
-        if work.t < stops[INSTANT, k]:
-            work.t = stops[INSTANT, k]
+        if work.t < stops[at.INSTANT, k]:
+            work.t = stops[at.INSTANT, k]
             return True
-        if work.t < stops[BEHIND, k]:
-            work.t = stops[BEHIND, k]
+        if work.t < stops[at.BEHIND, k]:
+            work.t = stops[at.BEHIND, k]
             restart(work)
             if not starts_projected:
-                failure = project_state(work, work.t, work.state[Y], project, system, loops)
-                if failure != RUNNING:
+                failure = project_state(work, work.t, work.state[at.Y], project, system, loops)
+                if failure != at.RUNNING:
                     work.t_stop, work.status = work.t, failure
             return True
     return False
@@ -153,16 +145,16 @@ def judge_pace(work: Any) -> int:
     """
     work.attempt_count += 1
     if work.attempt_count < ATTEMPTS:
-        return RUNNING
+        return at.RUNNING
     work.attempt_count = 0
     done, work.t_attempted = work.t - work.t_attempted, work.t
     asked = min(work.times[-1] - work.times[0], work.step_limit - work.t)
     if done > ATTEMPTS * STALLED_STEP * asked or work.fixed_step != 0.0:
         work.stall_start = work.rhs_count
     if (work.rhs_count - work.stall_start) * work.state.shape[1] > STALL_WORK:
-        return STALLED if work.stops_when_stiff == 0 else STIFF
+        return at.STALLED if work.stops_when_stiff == 0 else at.STIFF
     is_slow = work.stops_when_slow != 0 and done < ATTEMPTS * SLOW_STEP * asked
-    return STIFF if is_slow else RUNNING
+    return at.STIFF if is_slow else at.RUNNING
 
 
 @compiled_into
@@ -184,22 +176,22 @@ def report_reached(
     while work.next_report < times.size and times[work.next_report] <= work.t:
         if work.row_count == work.rows.shape[0]:
             return False
-        t, y = times[work.next_report], work.state[Y]
+        t, y = times[work.next_report], work.state[at.Y]
         if t < work.t:
-            y = work.state[TRIAL]
+            y = work.state[at.TRIAL]
             state_at(work, t, y)
             failure = project_state(work, t, y, project, system, loops)
             closed = work.position_residual <= work.rtol and work.velocity_residual <= work.rtol
-            if failure == PROJECTION_FAILED and closed:  # too close to a singular one for more
-                failure = RUNNING
-            if failure != RUNNING:
+            if failure == at.PROJECTION_FAILED and closed:  # too close to a singular one for more
+                failure = at.RUNNING
+            if failure != at.RUNNING:
                 work.t_stop, work.status = t, failure
                 return True
         if not write_row(work, t, y, report, system, loops):
             return True
         work.next_report += 1
     if work.next_report == times.size:
-        work.status = FINISHED
+        work.status = at.FINISHED
     return True
 
 
@@ -211,7 +203,7 @@ def report_end(work: Any, report: Function, system: Any, loops: Any) -> bool:
     if last < 0 or times[last] < t:
         if work.row_count == work.rows.shape[0]:
             return False
-        if not write_row(work, t, work.state[Y], report, system, loops):
+        if not write_row(work, t, work.state[at.Y], report, system, loops):
             return True
     work.t_stop, work.status = t, work.end_status
     return True
@@ -228,7 +220,7 @@ def write_row(work: Any, t: float, y: Floats, report: Function, system: Any, loo
     work.report_count += 1
     report(t, y, row[1 + n :], system, loops)
     if not all_finite(row):
-        work.t_stop, work.status = t, NOT_FINITE
+        work.t_stop, work.status = t, at.NOT_FINITE
         return False
     work.row_count += 1
     return True

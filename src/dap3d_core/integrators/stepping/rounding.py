@@ -16,19 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dap3d_core.integrators.stepping.integration_state import (
-    ABSOLUTE,
-    KIND,
-    MOST,
-    NOISE,
-    OTHER,
-    RUNNING,
-    SCRATCH,
-    TOLERANCES,
-    TRIAL,
-    Function,
-    Y,
-)
+from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.integrators.stepping.integration_state import Function
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
@@ -53,10 +42,10 @@ EVERY, PROBE = 8, 96
 
 def tolerance_of(size: int, atol: ArrayLike, kinds: ArrayLike) -> Floats:
     """(TOLERANCES, n) the absolute tolerance of each component; nothing known of its rounding."""
-    tolerance = np.zeros((TOLERANCES, size))
-    tolerance[ABSOLUTE] = np.maximum(atol, SMALLEST_ATOL)
+    tolerance = np.zeros((at.TOLERANCES, size))
+    tolerance[at.ABSOLUTE] = np.maximum(atol, SMALLEST_ATOL)
     first = np.asarray(kinds, dtype=np.int64)
-    tolerance[KIND] = np.append(first, np.arange(len(first), size))
+    tolerance[at.KIND] = np.append(first, np.arange(len(first), size))
     return tolerance
 
 
@@ -84,7 +73,7 @@ def update_rounding(
 @compiled
 def can_measure(work: Any, rejected: int) -> bool:
     """True if the rounding of rates can be measured, and was not in one of the last steps."""
-    if work.status != RUNNING or work.first_stage_valid == 0:
+    if work.status != at.RUNNING or work.first_stage_valid == 0:
         return False
     fails = work.rounding_state != 2 or work.rejected_count != rejected
     return fails or work.step_count % EVERY == 0
@@ -93,21 +82,21 @@ def can_measure(work: Any, rejected: int) -> bool:
 @compiled
 def judge_noise(work: Any, h: float) -> None:
     """Bound what was measured in a step h; forget it where it is far below the tolerances."""
-    y, tolerance, size = work.state[Y], work.tolerance, work.state[SCRATCH]
+    y, tolerance, size = work.state[at.Y], work.tolerance, work.state[at.SCRATCH]
     for i in range(y.size):
         size[i] = 0.0
     for i in range(y.size):
-        first = int(tolerance[KIND, i])
+        first = int(tolerance[at.KIND, i])
         size[first] = max(size[first], abs(y[i]))
     work.rounding_state = 0
     for i in range(work.error_size):
-        scale = tolerance[ABSOLUTE, i] + work.rtol * abs(y[i])
-        if h * tolerance[NOISE, i] > COUNTS * scale:
+        scale = tolerance[at.ABSOLUTE, i] + work.rtol * abs(y[i])
+        if h * tolerance[at.NOISE, i] > COUNTS * scale:
             work.rounding_state = 2
     for i in range(y.size):
-        tolerance[MOST, i] = LARGEST_EXCUSE * size[int(tolerance[KIND, i])]
+        tolerance[at.MOST, i] = LARGEST_EXCUSE * size[int(tolerance[at.KIND, i])]
         if work.rounding_state == 0:
-            tolerance[NOISE, i] = 0.0
+            tolerance[at.NOISE, i] = 0.0
 
 
 @compiled
@@ -133,7 +122,12 @@ def change_digits(y: Floats, sample: int, argument: Floats) -> None:
 @compiled
 def find_rate_noise(work: Any, noise: Floats, rhs: Function, system: Any, loops: Any) -> None:
     """Changes of dy/dt at the state by the last digits of y; dy/dt itself into TRIAL."""
-    y, argument, out, f = work.state[Y], work.state[SCRATCH], work.state[OTHER], work.state[TRIAL]
+    y, argument, out, f = (
+        work.state[at.Y],
+        work.state[at.SCRATCH],
+        work.state[at.OTHER],
+        work.state[at.TRIAL],
+    )
     rhs(work.t, y, f, system, loops)
     for i in range(y.size):
         noise[i] = 0.0
@@ -156,8 +150,8 @@ def measure_noise(
     The rates that the next step starts with are those before the projection. They differ by what
     that moves: by last digits, which is rounding as well, or by a tolerance, which is none.
     """
-    y, tolerance, noise = work.state[Y], work.tolerance, work.tolerance[NOISE]
-    argument, out, f = work.state[SCRATCH], work.state[OTHER], work.state[TRIAL]
+    y, tolerance, noise = work.state[at.Y], work.tolerance, work.tolerance[at.NOISE]
+    argument, out, f = work.state[at.SCRATCH], work.state[at.OTHER], work.state[at.TRIAL]
     find_rate_noise(work, noise, rhs, system, loops)
     for i in range(y.size):
         moved = ROUNDINGS * abs(first[i] - f[i])
@@ -169,7 +163,7 @@ def measure_noise(
     rhs(work.t, argument, out, system, loops)
     before = after = 0.0
     for i in range(work.error_size):
-        scale = tolerance[ABSOLUTE, i] + work.rtol * abs(y[i])
+        scale = tolerance[at.ABSOLUTE, i] + work.rtol * abs(y[i])
         before, after = max(before, noise[i] / scale), max(after, abs(out[i] - f[i]) / scale)
     growth = after / before if after > before > 0.0 else 1.0
     for i in range(y.size):

@@ -7,16 +7,8 @@ their codes DOPRI5 and DOP853.
 import math
 from typing import Any
 
-from dap3d_core.integrators.stepping.integration_state import (
-    ABSOLUTE,
-    PROJECTED,
-    RUNNING,
-    SCRATCH,
-    STEP_FLOOR,
-    TRIAL,
-    Function,
-    Y,
-)
+from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.integrators.stepping.integration_state import Function
 from dap3d_core.integrators.stepping.output import NEAR_SINGULAR
 from dap3d_core.integrators.stepping.vector_ops import copy, scaled_largest
 from dap3d_core.kernels.array_types import Floats
@@ -51,7 +43,7 @@ STRETCH = 1.01
 def first_step(work: Any, k: Floats, rhs: Function, system: Any, loops: Any) -> float:
     """Starting step of HNW II.4: an Euler step guesses the second derivative. One call of rhs."""
     size, rtol, tolerance = work.error_size, work.rtol, work.tolerance
-    y, y1, f, f1 = work.state[Y], work.state[SCRATCH], k[0], k[1]  # y1: before and after, too
+    y, y1, f, f1 = work.state[at.Y], work.state[at.SCRATCH], k[0], k[1]  # y1: before and after, too
     t, t_end, floor = work.t, work.times[-1], step_floor(work)
     d0 = scaled_largest(y1, y, y, y, size, rtol, tolerance, 0.0)
     d1 = scaled_largest(y1, f, y, y, size, rtol, tolerance, 0.0)
@@ -109,8 +101,8 @@ def work_error(work: Any, h: float, error: float) -> float:
     last = work.state.shape[1] - 1
     if work.error_size > last or h < WORK_STEP * (work.times[-1] - work.times[0]):
         return 0.0
-    most = max(work.largest_work, abs(work.state[Y, last]), abs(work.state[TRIAL, last]))
-    return abs(error) / (work.tolerance[ABSOLUTE, last] + WORK_SLACK * work.rtol * most)
+    most = max(work.largest_work, abs(work.state[at.Y, last]), abs(work.state[at.TRIAL, last]))
+    return abs(error) / (work.tolerance[at.ABSOLUTE, last] + WORK_SLACK * work.rtol * most)
 
 
 @compiled
@@ -133,7 +125,7 @@ def accept(work: Any, t1: float, error: float) -> None:
     """Make the trial state the state, and choose the next step (PI controller of HNW's codes)."""
     state, k, h, result = work.state, work.k, t1 - work.t, work.stage_count
     work.t = t1
-    copy(state[Y], state[TRIAL])
+    copy(state[at.Y], state[at.TRIAL])
     copy(k[0], k[result])
     work.step_count += 1
     if work.fixed_step != 0.0:
@@ -183,7 +175,7 @@ def turns_are_certain(work: Any, t1: float, accepted: Function, system: Any, loo
         return True
     moved = work.projection_moved
     work.projection_moved = OF_ERROR if work.fixed_step == 0.0 else OF_LENGTH
-    accepted(t1, work.state[TRIAL], work.real[PROJECTED:], system, loops)
+    accepted(t1, work.state[at.TRIAL], work.real[at.PROJECTED :], system, loops)
     doubtful, work.projection_moved = work.projection_moved, moved
     return bool(doubtful == 0.0)
 
@@ -199,7 +191,7 @@ def count_turns(
     """
     moved = work.projection_moved
     work.projection_moved = sense
-    accepted(work.t, work.state[Y], work.real[PROJECTED:], system, loops)
+    accepted(work.t, work.state[at.Y], work.real[at.PROJECTED :], system, loops)
     work.projection_moved = moved
 
 
@@ -207,13 +199,13 @@ def count_turns(
 def judge_turns(work: Any, t1: float, accepted: Function, system: Any, loops: Any) -> int:
     """RUNNING, or STEP_CUT where a shorter step than that to t1 is tried, also a fixed one."""
     if turns_are_certain(work, t1, accepted, system, loops):
-        return RUNNING
+        return at.RUNNING
     h = STEP_FOR_TURNS * (t1 - work.t)
     if work.fixed_step == 0.0:
-        reject(work, t1, h, STEP_FLOOR)
+        reject(work, t1, h, at.STEP_FLOOR)
         return STEP_CUT
     work.rejected_count += 1
     work.step_limit_at_switch = h
     if h < step_floor(work):
-        work.t_stop, work.status = t1, STEP_FLOOR
+        work.t_stop, work.status = t1, at.STEP_FLOOR
     return STEP_CUT

@@ -5,20 +5,8 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import ENDS, JUMPS, UNSEEN
-from dap3d_core.integrators.stepping.integration_state import (
-    BAND,
-    BEND,
-    DOES,
-    LOGGED,
-    OTHER,
-    RATE,
-    SIDE,
-    SWITCHED,
-    VALUE,
-    Function,
-    IntegrationState,
-    Y,
-)
+from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.integrators.stepping.integration_state import Function, IntegrationState
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -28,7 +16,13 @@ DIFFERENCE, LEAST_DIFFERENCE = 1e-4, 1e-8
 
 @compiled
 def evaluate(
-    work: IntegrationState, t: float, x: Floats, row: int, watch: Function, system: Any, loops: Any
+    work: IntegrationState,
+    t: float,
+    x: Floats,
+    row: int,
+    watch: Function,
+    system: Any,
+    loops: Any,
 ) -> None:
     """The switches at a state, into a row.
 
@@ -43,13 +37,13 @@ def evaluate(
 def count_from_far_edges(s: Floats, row: int) -> None:
     """Values of a row as ``evaluate`` gives them, from those of the switches."""
     for k in range(s.shape[1]):
-        s[row, k] += s[SIDE, k] * s[BAND, k]
+        s[row, k] += s[at.SIDE, k] * s[at.BAND, k]
 
 
 @compiled
 def may_rest(s: Floats, k: int) -> bool:
     """True if switch k may be at rest where it is zero: it is in its band, or as near to it."""
-    return s[SIDE, k] * s[VALUE, k] < 2.0 * s[BAND, k]
+    return s[at.SIDE, k] * s[at.VALUE, k] < 2.0 * s[at.BAND, k]
 
 
 @compiled
@@ -58,7 +52,7 @@ def near_edge(s: Floats, k: int) -> float:
 
     The near edge of its band, unless it may be at rest in it. Where it is UNSEEN both laws are one.
     """
-    return 0.0 if may_rest(s, k) or s[DOES, k] == UNSEEN else s[BAND, k]
+    return 0.0 if may_rest(s, k) or s[at.DOES, k] == UNSEEN else s[at.BAND, k]
 
 
 @compiled
@@ -67,17 +61,17 @@ def evaluate_start(
 ) -> None:
     """Values, sides and rates at the state; the run ends where it should have ended before."""
     s = work.switches
-    y = work.state[Y]
-    evaluate(work, work.t, y, VALUE, watch, system, loops)
+    y = work.state[at.Y]
+    evaluate(work, work.t, y, at.VALUE, watch, system, loops)
     for k in range(s.shape[1]):
-        if s[SIDE, k] == 0.0:
-            s[SIDE, k] = np.sign(s[VALUE, k])
-            s[VALUE, k] += s[SIDE, k] * s[BAND, k]
-        s[BEND, k] = 0.0
-        if s[DOES, k] == ENDS and s[SIDE, k] < 0.0:
-            work.end_status, work.terminal_switch = SWITCHED, k
+        if s[at.SIDE, k] == 0.0:
+            s[at.SIDE, k] = np.sign(s[at.VALUE, k])
+            s[at.VALUE, k] += s[at.SIDE, k] * s[at.BAND, k]
+        s[at.BEND, k] = 0.0
+        if s[at.DOES, k] == ENDS and s[at.SIDE, k] < 0.0:
+            work.end_status, work.terminal_switch = at.SWITCHED, k
             record_crossing(work, k, work.t)
-    find_switch_rates(work, work.t, y, slope, VALUE, RATE, watch, system, loops)
+    find_switch_rates(work, work.t, y, slope, at.VALUE, at.RATE, watch, system, loops)
     work.switch_rates_valid = 1
 
 
@@ -89,7 +83,7 @@ def find_switch_rates(
     """Rates of the switches along the slope, by a difference, from their values in a row."""
     h, x, s = (
         max(DIFFERENCE * usual_step(work), LEAST_DIFFERENCE * time_span(work)),
-        work.state[OTHER],
+        work.state[at.OTHER],
         work.switches,
     )
     for i in range(y.shape[0]):
@@ -104,7 +98,7 @@ def is_across(s: Floats, row: int) -> bool:
     """True if a switch, in a row of values, is on another side than at the start of the step."""
     found = 0
     for k in range(s.shape[1]):
-        found |= s[row, k] * s[SIDE, k] < 0.0
+        found |= s[row, k] * s[at.SIDE, k] < 0.0
     return found != 0
 
 
@@ -113,19 +107,19 @@ def changes_sign(s: Floats, row: int) -> bool:
     """True if a switch is on another side, or zero: then it is not known which law holds."""
     found = 0
     for k in range(s.shape[1]):
-        found |= (s[SIDE, k] != 0.0) & (s[row, k] * s[SIDE, k] <= near_edge(s, k))
+        found |= (s[at.SIDE, k] != 0.0) & (s[row, k] * s[at.SIDE, k] <= near_edge(s, k))
     return found != 0
 
 
 @compiled
 def record_crossing(work: IntegrationState, k: int, t: float) -> None:
     """Record that a switch changed its sign, unless it is UNSEEN, or velocities jump there."""
-    if work.switches[DOES, k] == UNSEEN or work.switches[DOES, k] >= JUMPS:
+    if work.switches[at.DOES, k] == UNSEEN or work.switches[at.DOES, k] >= JUMPS:
         return
     count = work.crossing_count
-    if count < LOGGED:
+    if count < at.LOGGED:
         row = work.crossings[count]
-        row[0], row[1], row[2] = t, k, work.switches[SIDE, k]
+        row[0], row[1], row[2] = t, k, work.switches[at.SIDE, k]
     work.crossing_count = count + 1
 
 

@@ -45,14 +45,29 @@ def sealed_content(path: str | os.PathLike[str]) -> bytes | None:
     return content
 
 
-def write_file(path: Path, data: bytes) -> bool:
-    """Write a complete file, or none: under another name, then renamed, as processes may race."""
-    temporary = path.with_name(f".{path.name}.{os.urandom(16).hex()}")
+def replace_file(path: Path, data: bytes) -> None:
+    """Write a complete file, or none: under another name, then renamed, as processes may race.
+
+    A link is replaced, never followed. No name is longer than a file system takes: of that of the
+    file 40 characters are kept, the last ones.
+
+    Raises:
+        OSError: the system refuses.
+    """
+    temporary = path.with_name(f".{path.name[-40:]}.{os.urandom(16).hex()}")
     try:
-        temporary.write_bytes(data)
+        with temporary.open("xb") as file:
+            file.write(data)
         os.replace(temporary, path)
-    except OSError:
+    finally:
         with suppress(OSError):
-            temporary.unlink()
+            temporary.unlink(missing_ok=True)
+
+
+def write_file(path: Path, data: bytes) -> bool:
+    """As ``replace_file``; False where the system refuses."""
+    try:
+        replace_file(path, data)
+    except OSError:
         return False
     return True

@@ -16,20 +16,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.plot.style import (
-    DASHES,
-    LETTERS,
-    MARKERS,
-    PALETTE,
-    PANEL_HEIGHT,
-    columns_of,
-    folded,
-    legend_above,
-    legend_below,
-    shown_text,
-    style_axes,
-    with_unit,
-)
+from dap3d_core.plot import style
 from dap3d_core.plot.sweep.sweep_table import DONE, Variable
 from dap3d_core.study import PointStatus
 
@@ -78,12 +65,12 @@ class StatusLegend:
         """Mark points without a value at x, y (n,); y None: above the lower edge."""
         for code, here in by_status(status, missing):
             _, marker, color = STATUS_STYLE[code]
-            style: dict[str, Any] = dict(marker=marker, color=color, markersize=4.5, linestyle="",
+            look: dict[str, Any] = dict(marker=marker, color=color, markersize=4.5, linestyle="",
                                          markerfacecolor="none", markeredgewidth=1.1)  # fmt: skip
             transform = ax.get_xaxis_transform() if y is None else ax.transData
             height = np.full(int(here.sum()), 0.035) if y is None else y[here]
-            ax.plot(x[here], height, transform=transform, clip_on=False, zorder=5, **style)
-            self.add(Line2D([], [], label=count_label(code, here), **style))
+            ax.plot(x[here], height, transform=transform, clip_on=False, zorder=5, **look)
+            self.add(Line2D([], [], label=count_label(code, here), **look))
 
     @property
     def handles(self) -> list[Any]:
@@ -93,8 +80,8 @@ class StatusLegend:
     def draw(self, figure: Figure) -> None:
         """Draw the legend, where it has any entry."""
         if self._handles:
-            columns = columns_of(list(self._handles), figure.get_figwidth() - 0.2)
-            legend_below(figure, self.handles, columns)
+            columns = style.columns_of(list(self._handles), figure.get_figwidth() - 0.2)
+            style.legend_below(figure, self.handles, columns)
 
 
 def by_status(status: Status, missing: Mask) -> Iterator[tuple[int, Mask]]:
@@ -116,7 +103,7 @@ class Panel(ABC):
     @property
     def height(self) -> float:
         """A suitable height, inches."""
-        return PANEL_HEIGHT
+        return style.PANEL_HEIGHT
 
     @abstractmethod
     def paint(self, ax: Axes, size: tuple[float, float], legend: StatusLegend) -> None:
@@ -137,10 +124,10 @@ def norm_of(values: Floats, is_log: bool = False) -> Normalize:
 
 def label_bar(bar: Any, variable: Variable, height: float) -> None:
     """Label a colour bar next to a panel of a height, inches."""
-    bar.ax.tick_params(labelsize=LETTERS)
-    bar.ax.yaxis.get_offset_text().set_fontsize(LETTERS)
-    label = with_unit(variable.label, variable.unit)
-    bar.set_label(folded(label, 13 * (height - 0.6)), fontsize=LETTERS)
+    bar.ax.tick_params(labelsize=style.LETTERS)
+    bar.ax.yaxis.get_offset_text().set_fontsize(style.LETTERS)
+    label = style.with_unit(variable.label, variable.unit)
+    bar.set_label(style.folded(label, 13 * (height - 0.6)), fontsize=style.LETTERS)
 
 
 @attrs.frozen(eq=False)
@@ -164,15 +151,15 @@ class Lines(Panel):
     def _draw(self, ax: Axes, k: int, output: Variable) -> None:
         """A line, its points marked where they are few."""
         x, few = self.x.values, len(self.x.values) <= MARKED
-        style: dict[str, Any] = dict(color=PALETTE[k % len(PALETTE)], markersize=3.5)
-        marker = MARKERS[k % len(MARKERS)]
+        look: dict[str, Any] = dict(color=style.PALETTE[k % len(style.PALETTE)], markersize=3.5)
+        marker = style.MARKERS[k % len(style.MARKERS)]
         ax.plot(x, output.values, marker=marker if few else "",
-                linestyle=DASHES[k // len(PALETTE) % len(DASHES)], linewidth=1.4,
-                label=shown_text(output.name), **style)  # fmt: skip
+                linestyle=style.DASHES[k // len(style.PALETTE) % len(style.DASHES)], linewidth=1.4,
+                label=style.shown_text(output.name), **look)  # fmt: skip
         finite = np.concatenate([[False], np.isfinite(output.values), [False]])
         alone = finite[1:-1] & ~finite[:-2] & ~finite[2:]
         if not few and alone.any():  # a value between two gaps makes no line
-            ax.plot(x[alone], output.values[alone], marker=marker, linestyle="", **style)
+            ax.plot(x[alone], output.values[alone], marker=marker, linestyle="", **look)
 
 
 @attrs.frozen(eq=False)
@@ -182,10 +169,11 @@ class Scatter(Lines):
     def _draw(self, ax: Axes, k: int, output: Variable) -> None:
         """Dots; the more there are, the fainter each is."""
         count = len(self.x.values)
-        ax.plot(self.x.values, output.values, marker=MARKERS[k % len(MARKERS)], linestyle="",
+        marker = style.MARKERS[k % len(style.MARKERS)]
+        ax.plot(self.x.values, output.values, marker=marker, linestyle="",
                 markersize=3.5 if count < 500 else 2.5, markeredgewidth=0.0,
                 alpha=float(np.clip((300.0 / count) ** 0.5, 0.15, 0.85)),
-                color=PALETTE[k % len(PALETTE)], label=shown_text(output.name),
+                color=style.PALETTE[k % len(style.PALETTE)], label=style.shown_text(output.name),
                 rasterized=count > 2000)  # fmt: skip
 
 
@@ -309,7 +297,7 @@ class Band(Panel):
         rows, x = rows[:, reached], x[reached]
         percentiles = np.nanpercentile(rows, (0.0, BAND[0], 50.0, BAND[1], 100.0), axis=0)
         least, low, middle, high, most = percentiles
-        color = PALETTE[0]
+        color = style.PALETTE[0]
         band = ax.fill_between(x, low, high, color=color, alpha=0.25, linewidth=0.0,
                                label=f"{BAND[0]:g} to {BAND[1]:g} %")  # fmt: skip
         (line,) = ax.plot(x, middle, color=color, label=f"median of {len(rows)}")
@@ -329,10 +317,12 @@ def _label_axes(ax: Axes, x: Variable, outputs: Sequence[Variable], size: tuple[
         ax.set_xscale("log")
     if outputs[0].is_log:
         ax.set_yscale("log")
-    ax.set_xlabel(folded(with_unit(x.label, x.unit), 13.5 * (width - 0.5)), fontsize=LETTERS)
+    ax.set_xlabel(
+        style.folded(style.with_unit(x.label, x.unit), 13.5 * (width - 0.5)), fontsize=style.LETTERS
+    )
     labels = list(dict.fromkeys(output.label for output in outputs))
-    label = with_unit(labels[0] if len(labels) == 1 else "", outputs[0].unit)
-    ax.set_ylabel(folded(label, 14 * (height - 0.4)), fontsize=LETTERS)
-    style_axes(ax, grid=grid)
+    label = style.with_unit(labels[0] if len(labels) == 1 else "", outputs[0].unit)
+    ax.set_ylabel(style.folded(label, 14 * (height - 0.4)), fontsize=style.LETTERS)
+    style.style_axes(ax, grid=grid)
     if len(outputs) > 1:
-        legend_above(ax, [output.name for output in outputs], width)
+        style.legend_above(ax, [output.name for output in outputs], width)

@@ -8,6 +8,7 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.kernels.runtime.sealed_files import replace_file
 from dap3d_core.scene.coerce import plain
 from dap3d_core.scene.errors import MISSING, Mistake, SceneError, file_error
 from dap3d_core.scene.tables import NAMED, SCENE_FILE, Element, SceneTables
@@ -55,14 +56,7 @@ def save(scene: SceneTables, path: str | Path, force: bool) -> Path:
         path = path / SCENE_FILE if path.is_dir() else path
         if not force and os.path.exists(path):
             raise file_error(path, "exists; force=True overwrites it")
-        target = Path(os.path.realpath(path))  # a link stays one
-        temporary = target.with_name(f".{os.urandom(16).hex()}.toml")
-        try:
-            with temporary.open("xb") as file:
-                file.write(text.encode("utf-8"))
-            os.replace(temporary, target)
-        finally:
-            temporary.unlink(missing_ok=True)
+        replace_file(Path(os.path.realpath(path)), text.encode("utf-8"))  # a link stays one
     except (OSError, ValueError) as error:  # ValueError: NUL in the path
         reason = error.strerror if isinstance(error, OSError) else error
         raise file_error(path, f"cannot be written: {reason}") from error

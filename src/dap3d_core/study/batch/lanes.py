@@ -375,7 +375,7 @@ def wide_rates(
     is_tree = tree is not None and tree.kept is None
     if not is_tree or evaluator.model.state_count or evaluator.model.body_count > MOST_BODIES:
         return reason
-    from dap3d_core.formulations.joint.lanes import tree_rates
+    from dap3d_core.formulations.programs.wide_program import tree_rates
 
     try:
         return tree_rates(evaluator, lane_count())

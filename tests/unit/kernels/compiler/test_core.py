@@ -119,7 +119,7 @@ NOT_CALLED = {
 NOT_NEEDED = tuple(
     f"dap3d_core.{module}."
     for module in (
-        "formulations.joint.lanes", "integrators.runge_kutta.lanes", "study.batch.lanes",
+        "formulations.programs.wide_program", "integrators.runge_kutta.lanes", "study.batch.lanes",
         "assembly.collisions", "integrators.moreau", "formulations.contacts",
         "formulations.joint_loops.contacts", "linear.least_squares",
     )

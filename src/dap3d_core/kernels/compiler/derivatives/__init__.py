@@ -9,9 +9,9 @@ zero where they would be infinite, and else those of the side that is computed.
 Code may say what differentiation by instructions does not know (``with_slopes``,
 ``is_differentiated``, ``values_alone`` of intrinsics.py): these are lines with a remark.
 
-One, three, seven and fifteen slopes fill a vector with the value (within.py); others are a vector
-of their own, beside it (beside.py). Slopes are neither contracted nor reassociated: their bits
-depend on no optimisation, and programs of a scene have those of general code.
+One, three, seven and fifteen slopes fill a vector with the value; others are a vector of their own,
+beside it (writers.py). Slopes are neither contracted nor reassociated: their bits depend on no
+optimisation, and programs of a scene have those of general code.
 
 The text is that of this compiler (writer.py, functions.py, trace.py), one instruction a line.
 Source: A. Griewank, A. Walther, Evaluating Derivatives, 2nd ed., SIAM 2008, chapter 3.
@@ -20,9 +20,8 @@ Source: A. Griewank, A. Walther, Evaluating Derivatives, 2nd ed., SIAM 2008, cha
 import re
 from collections.abc import Iterator
 
-from dap3d_core.kernels.compiler.derivatives.beside import BesideWriter
 from dap3d_core.kernels.compiler.derivatives.instructions import FILLING, PURE
-from dap3d_core.kernels.compiler.derivatives.within import WithinWriter
+from dap3d_core.kernels.compiler.derivatives.writers import BesideWriter, WithinWriter
 from dap3d_core.kernels.compiler.lanes import rewritten
 
 _DEFINED = re.compile(r"^(define .*\))([^()]*{)$", re.MULTILINE)
