@@ -135,6 +135,22 @@ def test_a_ball_slides_then_rolls_with_five_sevenths_of_its_speed(integrator):
     assert result.ledger["energy"].value < TOLERANCE
 
 
+def test_a_ball_rolls_on_a_plate_that_slides():
+    """What falls beside what falls: no acceleration but what contacts add says what is rounding."""
+    scene, m, M, mu, v = ball(height=0.1, v=1.0), 2.0, 4.0, 0.2, 1.0
+    del scene.contacts["floor"]
+    scene.add_body("plate", mass=M, Jp=[1e9] * 3, r=[0.0, 0.0, 0.05], r_dot=[v, 0.0, 0.0])
+    scene.add_contact("ball_plane", "floor", P_i="plate.O", radius=0.05, mu=mu)
+    scene.add_contact("ball_box", "on", P_i="ball.O", P_j="plate.O", radius=0.1, size=(2, 2, 0.1),
+                      mu=0.5)  # fmt: skip
+    result = dap.simulate(scene, t_end=0.2, dt=0.1, integrator="dop853", **TIGHT)
+    a = mu * (M + m) * G / (M + m * 2.0 / 7.0)
+    speeds = dict(zip(scene.bodies, result.rd[-1, :, 0], strict=True))
+    assert speeds["plate"] == pytest.approx(v - 0.2 * a, abs=1e-8)  # it turns by 1e-9 rad
+    assert speeds["ball"] == pytest.approx(v - 0.2 * a * 2.0 / 7.0, abs=1e-8)
+    assert np.all(result.contact("on").mode == 2)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_a_coulomb_oscillator_stops_where_its_spring_no_longer_overcomes_friction(integrator):

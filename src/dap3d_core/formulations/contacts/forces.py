@@ -16,6 +16,8 @@ STILL, ZERO = 1e-9, 1e-9
 #: Part of the largest acceleration of a group that counts as one of each of its contacts: what
 #: joints let turn fast beside what they let slide is no measure of it, but its rounding is there.
 BESIDE = 1e-3
+#: Part of the terms of an acceleration that may be rounding of it.
+CANCELLED = 1e-12
 #: What is left of a cone problem that has no solution.
 UNSOLVED = 1e-6
 #: A load that bounds nothing.
@@ -240,11 +242,26 @@ def begin_to_move(s: ContactArrays, part: float) -> bool:
         more = False
         for k in range(s.closed_count):
             c, a = s.closed[k], s.rates[3 * k : 3 * k + 3]
-            clear_rounding(s, k, ZERO * s.sizes[k], a)
+            clear_rounding(s, k, max(ZERO * s.sizes[k], CANCELLED * terms_of(s, k)), a)
             if size_across(s, c, a) > 0.0 and s.slipping[c] == 0:
                 s.slipping[c], more = 1, True
         if not (more and differs):
             return True
+
+
+@compiled
+def terms_of(s: ContactArrays, k: int) -> float:
+    """The largest sum of the terms that forces add to a rate of closed contact k.
+
+    Of bodies that fall beside each other these are all there is, where others hold one of them.
+    """
+    largest, n = 0.0, 3 * s.closed_count
+    for i in range(3 * k, 3 * k + 3):
+        total = 0.0
+        for q in range(n):
+            total += abs(s.cone.A[i, q] * s.cone.x[q])
+        largest = max(largest, total)
+    return largest
 
 
 @compiled

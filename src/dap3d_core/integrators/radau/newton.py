@@ -39,7 +39,7 @@ from dap3d_core.integrators.radau.convergence import (
     is_stalled,
     size_of_change,
 )
-from dap3d_core.integrators.radau.state import Given, RadauState
+from dap3d_core.integrators.radau.state import SLOPE, Given, RadauState
 from dap3d_core.integrators.radau.tableau import FEWEST
 from dap3d_core.integrators.stepping.integration_state import SCRATCH, Y
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
@@ -144,7 +144,9 @@ def lagrange(c: Floats, stages: int, j: int, u: float) -> float:
 def predict(h: float, work: RadauState, prolong: bool, system: System) -> None:
     """Starting values of the stages: the polynomials of the last step, prolonged (HW IV.8).
 
-    Or the state as it is, where they are not to be prolonged, or there was no step before.
+    Or the state as it is, where they are not to be prolonged, or there was no step before. But
+    where there are contacts, along its slope then: a tangent where slip is zero holds its direction
+    so stiffly that the iteration seems to have found the stages, whatever friction turns.
 
     mu is no smooth function: it has the same values at the stages of each step, but for a power of
     h; where the number of stages has changed it starts from zero. Nor is lambda prolonged where
@@ -162,6 +164,9 @@ def predict(h: float, work: RadauState, prolong: bool, system: System) -> None:
         if work.has_last_step == 0 or not prolong or keeps:
             for k in range(now.shape[2]):
                 now[i, 1, k] = last[before - 1, 1, k]
+        if work.has_last_step == 0 and prolong and keeps:
+            for k in range(stages.shape[1]):
+                stages[i, k] = c[i] * h * work.state[SLOPE, k]
         if work.has_last_step == 0 or not prolong:
             continue
         ratio = h / work.accepted_step

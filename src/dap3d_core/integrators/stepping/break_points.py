@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from dap3d_core.assembly.arrays import MODE_ENDS
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration_state import IntegrationState
 from dap3d_core.kernels.array_types import Floats
@@ -27,13 +28,18 @@ def stop_table(stops: Sequence[tuple[float, bool]], *, is_adaptive: bool) -> Flo
 
 @compiled
 def restart(work: IntegrationState) -> None:
-    """Let the next step start anew: what the functions compute has changed."""
+    """Let the next step start anew: what the functions compute has changed.
+
+    Switches are on the side where they are found, but those of contacts, on that of their modes: in
+    its band one may have the other sign.
+    """
     work.h = 0.0
     work.last_error, work.step_limit_at_switch = 1e-4, np.inf
     work.first_stage_valid = work.switch_rates_valid = 0
     work.last_rejected = work.cut_attempts = 0
     for q in range(work.switches.shape[1]):
-        work.switches[at.SIDE, q] = 0.0
+        is_contact = work.switches[at.DOES, q] == MODE_ENDS
+        work.switches[at.SIDE, q] = 1.0 if is_contact else 0.0
 
 
 @compiled

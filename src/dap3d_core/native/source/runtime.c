@@ -345,6 +345,10 @@ static void restart(dap3d_model *m)
     integer[I_first_stage_valid] = integer[I_switch_rates_valid] = 0;
     integer[I_last_rejected] = integer[I_cut_attempts] = 0;
     memset(m->w + integrations[m->which].sides, 0, 8 * SWITCHES);
+#if CONTACTS
+    for (int k = 0; k < 2 * CONTACTS; k++)
+        numbers(m, integrations[m->which].sides)[m->w[CONTACT_SWITCHES + k]] = 1.0;
+#endif
 }
 
 /* As Integration.project: the state onto its constraints; whether that went well. */
@@ -442,20 +446,12 @@ static int let_jump(dap3d_model *m, const double *crossing, const double *sides,
 #if CONTACTS
 enum { PRESCRIBED = 1, JAMMED, OVERLAPS, PUSHES, WEDGED, ENDLESS, SLOWLY };
 
-/* Let switches of contacts be on the side of what goes on. */
-static void go_on(dap3d_model *m, double *sides)
-{
-    for (int k = 0; k < 2 * CONTACTS; k++)
-        sides[m->w[CONTACT_SWITCHES + k]] = 1.0;
-}
-
 /* As ContactJumps._go_on: the state that was decided on becomes that of the run. */
 static void take_decided(dap3d_model *m)
 {
     double rates[STATES];
     memcpy(y_of(m), numbers(m, CONTACT_Y), 8 * STATES);
     restart(m);
-    go_on(m, numbers(m, integrations[m->which].sides));
     call(m, RHS, real_of(m)[R_t], y_of(m), rates, STATES);
 }
 
@@ -958,9 +954,6 @@ int dap3d_set_states(dap3d_model *m, double t, const double *y)
 #endif
     integer_of(m)[I_segment_step] = integer_of(m)[I_segment_step_count] = 0;
     restart(m);
-#if CONTACTS
-    go_on(m, numbers(m, integrations[m->which].sides));
-#endif
     if (integer_of(m)[I_calls_accepted]) {
         double moved = real[R_projection_moved];
         real[R_projection_moved] = 1.0; /* as count_turns, from the start of a step */

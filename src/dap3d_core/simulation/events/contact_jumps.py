@@ -365,7 +365,6 @@ class ContactJumps(Jumps):
         work.state[at.Y] = y
         integration.restart()
         evaluator.states = states
-        work.switches[at.SIDE][self.table.switches.ravel()] = 1.0
         evaluator.slope(integration.t, y)
 
     def _note(

@@ -65,3 +65,19 @@ def test_full_rows_and_spent_budgets_are_told():
         calls += 1
     assert calls > 1
     assert integration.t == 0.7
+
+
+def test_what_starts_anew_is_on_the_side_of_its_modes():
+    """A ball at rest whose gap is less than zero by rounding touches again, and does not fall."""
+    scene = dap.Scene(name="ball")
+    scene.add_body("ball", mass=1.0, r=[0.0, 0.0, 0.1 - 1e-15])
+    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1)
+    scene.add_force("weight", "g")
+    evaluator = dap.compile(scene).evaluator
+    options = integration_options(evaluator, scene.simulation)
+    y = evaluator.integrated(evaluator.model.u0)
+    integration = INTEGRATORS["dop853"].make(evaluator, y, TIMES, **options)
+    integration.restart()
+    integration.advance(np.inf)
+    assert integration.status is Status.JUMPED
+    assert integration.t < 1e-6
