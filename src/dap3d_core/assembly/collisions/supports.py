@@ -20,8 +20,8 @@ from dap3d_core.scene.contacts.collision_shapes import (
 
 #: Sine of the angle between an axis and a direction below which a rim lies flat.
 FLAT = 1e-9
-#: Points of a rim that stand for it, and of a polygon that there is room for.
-RIM, CORNERS = 8, 16
+#: Points of a rim that stand for it, and of a face; with those that clipping adds.
+RIM, CORNERS, CLIPPED_CORNERS = 8, 16, 32
 
 
 @compiled
@@ -105,7 +105,7 @@ def near_support(
 ) -> int:
     """Put the points of solid k within a band below its support plane along sign d; their number.
 
-    They are rows of scratch from ``start`` on, CORNERS at most.
+    They are rows of scratch from ``start`` on, CORNERS at most: of more, those farthest around.
     """
     u, h, what, count = shapes.axes[k], shapes.size[k], shapes.kind[k], 0
     if what in (SPHERE, ELLIPSOID):
@@ -140,7 +140,39 @@ def near_support(
             far = p * x + q * y + s * z
             if turn == 0:
                 best = max(best, far)
-            elif far >= best - band and count < CORNERS:
-                put_global(shapes, k, p, q, s, shapes.work[start + count])
+            elif far >= best - band:
+                if count < CORNERS:
+                    put_global(shapes, k, p, q, s, shapes.work[start + count])
                 count += 1
+    if count > CORNERS:
+        return _farthest_around(shapes, k, x, y, z, best - band, start)
+    return count
+
+
+@compiled
+def _farthest_around(
+    shapes: PlacedShapes, k: int, x: float, y: float, z: float, least: float, start: int
+) -> int:
+    """Put the vertices of a hull farthest in CORNERS directions across one; their number.
+
+    Of those that lie farther than ``least`` along that, (x, y, z) in the axes of the hull.
+    """
+    vertices, first, count = shapes.vertices, shapes.corners[k, 0], 0
+    e0, e1, e2 = (0.0, z, -y) if abs(x) < 0.6 else (-z, 0.0, x)
+    f0, f1, f2 = y * e2 - z * e1, z * e0 - x * e2, x * e1 - y * e0
+    at, one = -1, -1
+    for side in range(CORNERS):
+        a, b = math.cos(2.0 * math.pi / CORNERS * side), math.sin(2.0 * math.pi / CORNERS * side)
+        p, q, s, best, last = a * e0 + b * f0, a * e1 + b * f1, a * e2 + b * f2, -1e300, at
+        for c in range(first, first + shapes.corners[k, 1]):
+            v = vertices[c]
+            if v[0] * x + v[1] * y + v[2] * z >= least:
+                far = v[0] * p + v[1] * q + v[2] * s
+                if far > best:
+                    best, at = far, c
+        if at != last and at != one:
+            one = at if side == 0 else one
+            put_global(shapes, k, vertices[at, 0], vertices[at, 1], vertices[at, 2],
+                       shapes.work[start + count])  # fmt: skip
+            count += 1
     return count
