@@ -153,26 +153,29 @@ def near_support(
 def _farthest_around(
     shapes: PlacedShapes, k: int, x: float, y: float, z: float, least: float, start: int
 ) -> int:
-    """Put the vertices of a hull farthest in CORNERS directions across one; their number.
+    """Put the vertex of a hull farthest along (x, y, z), in its axes, and those farthest around it.
 
-    Of those that lie farther than ``least`` along that, (x, y, z) in the axes of the hull.
+    They are the farthest in CORNERS - 1 directions across that, of those beyond ``least`` along it.
+    Returns their number.
     """
     vertices, first, count = shapes.vertices, shapes.corners[k, 0], 0
+    one, ring, last = -1, -1, -1
     e0, e1, e2 = (0.0, z, -y) if abs(x) < 0.6 else (-z, 0.0, x)
     f0, f1, f2 = y * e2 - z * e1, z * e0 - x * e2, x * e1 - y * e0
-    at, one = -1, -1
     for side in range(CORNERS):
-        a, b = math.cos(2.0 * math.pi / CORNERS * side), math.sin(2.0 * math.pi / CORNERS * side)
-        p, q, s, best, last = a * e0 + b * f0, a * e1 + b * f1, a * e2 + b * f2, -1e300, at
+        angle = 2.0 * math.pi / (CORNERS - 1) * side
+        a, b, best, at = math.cos(angle), math.sin(angle), -1e300, first
+        p, q, s = a * e0 + b * f0, a * e1 + b * f1, a * e2 + b * f2
+        if side == 0:
+            p, q, s = x, y, z
         for c in range(first, first + shapes.corners[k, 1]):
             v = vertices[c]
-            if v[0] * x + v[1] * y + v[2] * z >= least:
-                far = v[0] * p + v[1] * q + v[2] * s
-                if far > best:
-                    best, at = far, c
-        if at != last and at != one:
-            one = at if side == 0 else one
+            far = v[0] * p + v[1] * q + v[2] * s
+            if far > best and v[0] * x + v[1] * y + v[2] * z >= least:
+                best, at = far, c
+        if side == 0 or (at != one and at != ring and at != last):
             put_global(shapes, k, vertices[at, 0], vertices[at, 1], vertices[at, 2],
                        shapes.work[start + count])  # fmt: skip
             count += 1
+        one, ring, last = (at if side == 0 else one), (at if side == 1 else ring), at
     return count

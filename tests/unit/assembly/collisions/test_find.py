@@ -148,7 +148,7 @@ def prism(corners):
 @pytest.mark.parametrize(("upper", "lower"), [(64, 64), (64, 7), (16, 16), (40, None)])
 def test_faces_of_many_corners_touch_all_around(upper, lower):
     """Of a face that has more corners than there is room for, and where clipping makes more: some
-    lie near each end of its border. A prism on a plane has 16, and their middle is its own."""
+    lie near each end of its border. A prism on a plane has 16 at most."""
     kinds, ways = (HULL, HULL if lower else PLANE), (prism(upper), prism(lower or 4))
     pair = finder(kinds, [[0.5, 0.5, 0.3], [0.5, 0.5, 0.3]], ways)
     r, p = np.zeros((2, 3)), np.array([[np.cos(0.1), 0, 0, np.sin(0.1)], [1.0, 0, 0, 0]])
@@ -158,7 +158,7 @@ def test_faces_of_many_corners_touch_all_around(upper, lower):
     for angle in np.linspace(0.0, 2.0 * np.pi, 50):
         far = found.point[:, :2] @ [np.cos(angle), np.sin(angle)]
         assert far.max() > 0.5 * (0.97 if lower != 7 else np.cos(np.pi / 7) - 0.03)
-    assert lower or found.point[:, :2].mean(axis=0) == pytest.approx([0.0, 0.0], abs=0.01)
+    assert lower or 14 < len(found.gap) <= 16
 
 
 @pytest.mark.parametrize("part", [0.5, 0.95, 0.999])
