@@ -124,6 +124,7 @@ def test_gaps_are_distances_along_the_normals(kinds):
 @pytest.mark.parametrize(("kinds", "sizes", "points"), [
     ((CYLINDER, BOX), [[0.2, 0.3, 0.0], [0.5, 0.5, 0.5]], 8),
     ((CYLINDER, CYLINDER), [[0.2, 0.3, 0.0], [0.4, 0.5, 0.0]], 8),
+    ((CYLINDER, PLANE), [[0.2, 0.3, 0.0], [0.0, 0.0, 0.0]], 8),
     ((BOX, CYLINDER), [[0.2, 0.2, 0.3], [0.5, 0.5, 0.0]], 4),
     ((ELLIPSOID, BOX), [[0.2, 0.1, 0.3], [0.5, 0.5, 0.5]], 1),
 ])  # fmt: skip
