@@ -61,9 +61,9 @@ class SdfReader:
         if alone and models:
             self.model.name = models[0].get("name") or self.model.name
         for element in models:
-            self._model(element, "", "" if alone else element.require("name"))
+            self._model(element, None, "" if alone else element.require("name"))
         for element in includes:
-            self._include(element, "", "" if alone else None)
+            self._include(element, None, "" if alone else None)
         for element in frames:
             self._frame(element, "", WORLD)
         for element in joints:
@@ -85,7 +85,7 @@ class SdfReader:
         for name, link in self.model.links.items():
             self.model.base_poses[name] = self.frames.in_world(name, link.place)
 
-    def _include(self, element: XmlElement, outer: str, scope: str | None) -> None:
+    def _include(self, element: XmlElement, outer: str | None, scope: str | None) -> None:
         """A model of another file; its name and pose may be given here."""
         uri = element.first("uri")
         name = "" if uri is None else uri.text.strip()
@@ -104,13 +104,13 @@ class SdfReader:
             if child is not None:
                 inner.children = [c for c in inner.children if c.name != tag] + [child]
         with self.source.including(file):
-            self._model(inner, outer, scoped(outer, called) if scope is None else scope)
+            self._model(inner, outer, scoped(outer or "", called) if scope is None else scope)
 
-    def _model(self, element: XmlElement, outer: str, scope: str) -> None:
-        """A model, whose names begin with its scope."""
+    def _model(self, element: XmlElement, outer: str | None, scope: str) -> None:
+        """A model, whose names begin with its scope; outer: that of the model around, if any."""
         pose, relative = self.pose(element)
-        parent = scoped(outer, relative) if relative else scoped(outer, "__model__")
-        parent = parent if outer or relative else WORLD
+        parent = relative or (WORLD if outer is None else "__model__")
+        parent = scoped(outer or "", parent)
         inner = scoped(scope, "__model__")
         placement = element.get("placement_frame") or text_of(element, "placement_frame")
         self.frames.add(inner, parent, pose, element.place,
@@ -131,7 +131,7 @@ class SdfReader:
             self._frame(child, scope)
         for child in element.all("joint"):
             self._joint_frame(child, scope)
-        if not outer and text_of(element, "self_collide") not in ("true", "1"):
+        if outer is None and text_of(element, "self_collide") not in ("true", "1"):
             alone = [n for n in list(self.model.links)[before:] if n not in self.self_collide]
             self.model.excluded += combinations(alone, 2)
         if text_of(element, "static") in ("true", "1"):

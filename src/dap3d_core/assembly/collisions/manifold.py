@@ -4,15 +4,24 @@ import math
 
 from dap3d_core.assembly.collisions.distance import dot
 from dap3d_core.assembly.collisions.placed_shapes import GAP, PlacedShapes, add
-from dap3d_core.assembly.collisions.supports import CORNERS, extent_of, near_support, radius_of
+from dap3d_core.assembly.collisions.supports import (
+    CLIPPED_CORNERS,
+    RIM,
+    extent_of,
+    near_support,
+    radius_of,
+)
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.scene.contacts.collision_shapes import PLANE
+from dap3d_core.scene.contacts.collision_shapes import CYLINDER, PLANE
 
-#: Rows of scratch: polygons of i and j, their points while one is clipped; tangents.
-POLYGON, OTHER, CLIPPED, E1, E2 = 40, 56, 72, 104, 105
+#: Rows of scratch: polygons of i and j, their points while one is clipped; tangents; middle of a
+#: cap, and the way from there to what touches it.
+POLYGON, OTHER, CLIPPED, E1, E2, MIDDLE, WAY = 40, 72, 104, 136, 137, 139, 140
 #: Parts of lengths within which corners lie on a line, edges are parallel, or points on a border.
 ON_LINE, PARALLEL, BORDER = 1e-12, 1e-6, 1e-9
+#: Part of the radius of a cap that lies within its points, whichever way they are turned.
+WITHIN = 0.92
 #: Points of solids this part of their size below a support plane are left out, however fast.
 DEEPEST = 0.1
 
@@ -67,12 +76,12 @@ def clip(work: Floats, start: int, count: int, x: Floats, limit: float, border: 
     for k in range(count):
         p, q = work[CLIPPED + k], work[CLIPPED + (k + 1) % count]
         a, b = dot(x, p) - limit, dot(x, q) - limit
-        if a <= border and left < CORNERS:
+        if a <= border and left < CLIPPED_CORNERS:
             for c in range(3):
                 work[start + left, c] = p[c]
             left += 1
         crosses = (a < -border and b > border) or (a > border and b < -border)
-        if crosses and left < CORNERS and (count > 2 or k == 0):
+        if crosses and left < CLIPPED_CORNERS and (count > 2 or k == 0):
             for c in range(3):
                 work[start + left, c] = p[c] + a / (a - b) * (q[c] - p[c])
             left += 1
@@ -119,6 +128,70 @@ def inside(work: Floats, start: int, count: int, other: int, corners: int, size:
             at = dot(x, p) if corners > 2 else dot(x, q)
             count = clip(work, start, count, x, at, BORDER * size)
     return count
+
+
+@compiled
+def put_middle(work: Floats, start: int, out: int) -> None:
+    """The middle of the points of a cap."""
+    for k in range(3):
+        work[out, k] = 0.0
+        for c in range(RIM):
+            work[out, k] += work[start + c, k] / RIM
+
+
+@compiled
+def put_way(shapes: PlacedShapes, j: int, other: int, corners: int, n: Floats) -> float:
+    """Put the way across n from the middle of a cap to the nearest point of j; its length."""
+    work, least, over = shapes.work, 1e300, corners > 2
+    middle, way, x = work[MIDDLE], work[WAY], work[E2 + 1]
+    is_cap = shapes.kind[j] == CYLINDER and corners == RIM  # to its middle, and its radius less
+    for c in range(1 if is_cap or corners == 2 else corners):
+        p, q, along, square = work[other + c], work[other + (c + 1) % corners], 0.0, 0.0
+        for k in range(3):
+            along, square = along + (q[k] - p[k]) * (middle[k] - p[k]), square + (q[k] - p[k]) ** 2
+        along = min(max(along / square, 0.0), 1.0) if square > 0.0 else 0.0
+        over = over and turn(p, q, middle, work) >= 0.0
+        if is_cap:
+            put_middle(work, other, E2 + 1)
+        for k in range(3):
+            x[k] = (x[k] if is_cap else p[k] + along * (q[k] - p[k])) - middle[k]
+        high = dot(x, n)
+        for k in range(3):
+            x[k] -= high * n[k]
+        if dot(x, x) < least:
+            least = dot(x, x)
+            for k in range(3):
+                way[k] = x[k]
+    if is_cap:
+        return math.sqrt(least) - WITHIN * shapes.size[j, 0]
+    return 0.0 if over else math.sqrt(least)
+
+
+@compiled
+def face(
+    shapes: PlacedShapes, i: int, start: int, count: int, j: int, other: int, corners: int,
+    n: Floats,
+) -> None:  # fmt: skip
+    """Turn the points of a cap towards solid j where that touches it next to its rim.
+
+    Between two of them the rim lies beyond their chord, and what touches there alone had no point.
+    """
+    if shapes.kind[i] != CYLINDER or count != RIM:
+        return
+    work, radius = shapes.work, shapes.size[i, 0]
+    put_middle(work, start, MIDDLE)
+    if put_way(shapes, j, other, corners, n) <= WITHIN * radius:
+        return
+    way = work[WAY]
+    length = math.sqrt(dot(way, way))
+    x, y, z = way[0] / length, way[1] / length, way[2] / length
+    for c in range(RIM):  # turning left, as ``outline`` leaves them
+        angle = 2.0 * math.pi / RIM * c
+        e, f = radius * math.cos(angle), radius * math.sin(angle)
+        p = work[start + c]
+        p[0] = work[MIDDLE, 0] + e * x + f * (n[1] * z - n[2] * y)
+        p[1] = work[MIDDLE, 1] + e * y + f * (n[2] * x - n[0] * z)
+        p[2] = work[MIDDLE, 2] + e * z + f * (n[0] * y - n[1] * x)
 
 
 @compiled
@@ -192,6 +265,8 @@ def points_within(
     single, from_i, left, passing = ni == 1 or nj == 1, ni == 1, 1, gap
     if not single:
         ni, nj = outline(work, POLYGON, ni), outline(work, OTHER, nj)
+        face(shapes, i, POLYGON, ni, j, OTHER, nj, n)
+        face(shapes, j, OTHER, nj, i, POLYGON, ni, n)
         from_i = spread(work, OTHER, nj, n) <= spread(work, POLYGON, ni, n)
         if ni == 2 and nj == 2:
             single = crossing(work)

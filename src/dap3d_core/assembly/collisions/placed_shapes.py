@@ -19,7 +19,7 @@ POSE = 7
 #: the gap. In ``which``: shapes i and j, and a number that tells points of a pair apart.
 POINT, NORMAL, GAP, WIDTH = 0, 3, 6, 7
 #: Rows of scratch: of two polygons of boxes, with corners, at most 8 each; of convex solids.
-CORNERS, ROWS = 16, 120
+CORNERS, ROWS = 16, 141
 
 
 @attrs.define(eq=False, kw_only=True, slots=False)

@@ -1,7 +1,7 @@
-"""Points where spheres and capsules touch each other, boxes and cylinders, and shapes a plane.
+"""Points where spheres and capsules touch each other and boxes, spheres cylinders, these a plane.
 
 All of them by formulas: distances of points and line segments, nearest points of solids, and at a
-plane gaps of centres, ends, corners and rims.
+plane gaps of centres, ends and corners.
 """
 
 import math
@@ -9,10 +9,7 @@ import math
 from dap3d_core.assembly.collisions.placed_shapes import CORNERS, PlacedShapes, add
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.scene.contacts.collision_shapes import BOX, CAPSULE, CYLINDER, SPHERE
-
-#: Length of the part of a plane's normal across an axis below which a rim lies flat.
-FLAT = 1e-9
+from dap3d_core.scene.contacts.collision_shapes import BOX, CAPSULE, SPHERE
 
 
 @compiled
@@ -48,33 +45,6 @@ def at_plane(shapes: PlacedShapes, count: int, i: int, j: int) -> int:
             y = d[1] + a * u[3] + b * u[4] + c * u[5]
             z = d[2] + a * u[6] + b * u[7] + c * u[8]
             count = above(shapes, count, i, j, corner, x, y, z, 0.0)
-    if kind == CYLINDER:
-        count = _rims(shapes, count, i, j)
-    return count
-
-
-@compiled
-def _rims(shapes: PlacedShapes, count: int, i: int, j: int) -> int:
-    """Both rims of a cylinder: the lowest point of each, and three more a quarter turn apart."""
-    d, u, w = shapes.centre[i], shapes.axes[i], shapes.axes[j]
-    # the way down within the plane of a rim, in the axes of the cylinder
-    a = -(w[2] * u[0] + w[5] * u[3] + w[8] * u[6])
-    b = -(w[2] * u[1] + w[5] * u[4] + w[8] * u[7])
-    length = math.sqrt(a * a + b * b)
-    if length > FLAT:
-        a, b = a / length, b / length
-    else:
-        a, b = 1.0, 0.0
-    for side in range(2):
-        c = shapes.size[i, 1] * (2.0 * side - 1.0)
-        p, q = shapes.size[i, 0] * a, shapes.size[i, 0] * b
-        for k in range(4):
-            x = d[0] + p * u[0] + q * u[1] + c * u[2]
-            y = d[1] + p * u[3] + q * u[4] + c * u[5]
-            z = d[2] + p * u[6] + q * u[7] + c * u[8]
-            feature = 4 * side + k
-            count = above(shapes, count, i, j, feature, x, y, z, 0.0)
-            p, q = -q, p
     return count
 
 

@@ -20,8 +20,8 @@ from dap3d_core.scene.contacts.collision_shapes import (
 
 #: Sine of the angle between an axis and a direction below which a rim lies flat.
 FLAT = 1e-9
-#: Points of a rim that stand for it, and of a polygon that there is room for.
-RIM, CORNERS = 8, 16
+#: Points of a rim that stand for it, and of a face; with those that clipping adds.
+RIM, CORNERS, CLIPPED_CORNERS = 8, 16, 32
 
 
 @compiled
@@ -105,7 +105,7 @@ def near_support(
 ) -> int:
     """Put the points of solid k within a band below its support plane along sign d; their number.
 
-    They are rows of scratch from ``start`` on, CORNERS at most.
+    They are rows of scratch from ``start`` on, CORNERS at most: of more, those farthest around.
     """
     u, h, what, count = shapes.axes[k], shapes.size[k], shapes.kind[k], 0
     if what in (SPHERE, ELLIPSOID):
@@ -140,7 +140,42 @@ def near_support(
             far = p * x + q * y + s * z
             if turn == 0:
                 best = max(best, far)
-            elif far >= best - band and count < CORNERS:
-                put_global(shapes, k, p, q, s, shapes.work[start + count])
+            elif far >= best - band:
+                if count < CORNERS:
+                    put_global(shapes, k, p, q, s, shapes.work[start + count])
                 count += 1
+    if count > CORNERS:
+        return _farthest_around(shapes, k, x, y, z, best - band, start)
+    return count
+
+
+@compiled
+def _farthest_around(
+    shapes: PlacedShapes, k: int, x: float, y: float, z: float, least: float, start: int
+) -> int:
+    """Put the vertex of a hull farthest along (x, y, z), in its axes, and those farthest around it.
+
+    They are the farthest in CORNERS - 1 directions across that, of those beyond ``least`` along it.
+    Returns their number.
+    """
+    vertices, first, count = shapes.vertices, shapes.corners[k, 0], 0
+    one, ring, last = -1, -1, -1
+    e0, e1, e2 = (0.0, z, -y) if abs(x) < 0.6 else (-z, 0.0, x)
+    f0, f1, f2 = y * e2 - z * e1, z * e0 - x * e2, x * e1 - y * e0
+    for side in range(CORNERS):
+        angle = 2.0 * math.pi / (CORNERS - 1) * side
+        a, b, best, at = math.cos(angle), math.sin(angle), -1e300, first
+        p, q, s = a * e0 + b * f0, a * e1 + b * f1, a * e2 + b * f2
+        if side == 0:
+            p, q, s = x, y, z
+        for c in range(first, first + shapes.corners[k, 1]):
+            v = vertices[c]
+            far = v[0] * p + v[1] * q + v[2] * s
+            if far > best and v[0] * x + v[1] * y + v[2] * z >= least:
+                best, at = far, c
+        if side == 0 or (at != one and at != ring and at != last):
+            put_global(shapes, k, vertices[at, 0], vertices[at, 1], vertices[at, 2],
+                       shapes.work[start + count])  # fmt: skip
+            count += 1
+        one, ring, last = (at if side == 0 else one), (at if side == 1 else ring), at
     return count

@@ -46,11 +46,12 @@ class ShapeFinder:
         )
 
 
-def finder(kinds, sizes):
-    """Shapes of bodies 1, 2, ... about their origins."""
+def finder(kinds, sizes, ways=(WAYS, WAYS)):
+    """Shapes of bodies 1, 2, ... about their origins; of hulls the vertices are ways by sizes."""
     m, sizes = len(kinds), np.array(sizes, dtype=float)
-    hulls = [size * WAYS for size in sizes]
-    corners = np.array([[len(WAYS) * k, len(WAYS)] for k in range(m)])
+    hulls = [size * ways[k % 2] for k, size in enumerate(sizes)]
+    ends = np.cumsum([0, *map(len, hulls)])
+    corners = np.array([ends[:-1], np.diff(ends)]).T
     return ShapeFinder(CollisionShapes(
         tuple(map(str, range(m))), np.array(kinds), np.arange(1, m + 1), np.zeros((m, 3)),
         np.tile([1.0, 0.0, 0.0, 0.0], (m, 1)), sizes, corners, np.concatenate(hulls),
@@ -123,6 +124,7 @@ def test_gaps_are_distances_along_the_normals(kinds):
 @pytest.mark.parametrize(("kinds", "sizes", "points"), [
     ((CYLINDER, BOX), [[0.2, 0.3, 0.0], [0.5, 0.5, 0.5]], 8),
     ((CYLINDER, CYLINDER), [[0.2, 0.3, 0.0], [0.4, 0.5, 0.0]], 8),
+    ((CYLINDER, PLANE), [[0.2, 0.3, 0.0], [0.0, 0.0, 0.0]], 8),
     ((BOX, CYLINDER), [[0.2, 0.2, 0.3], [0.5, 0.5, 0.0]], 4),
     ((ELLIPSOID, BOX), [[0.2, 0.1, 0.3], [0.5, 0.5, 0.5]], 1),
 ])  # fmt: skip
@@ -135,6 +137,56 @@ def test_what_stands_on_a_face_has_all_its_corners(kinds, sizes, points):
     assert found.gap == pytest.approx([1e-9] * points, abs=1e-15)
     assert np.abs(found.normal[:, 2]) == pytest.approx([1.0] * points, abs=1e-14)
     assert found.point[:, :2].mean(axis=0) == pytest.approx([0.1, 0.0], abs=1e-14)
+
+
+def prism(corners):
+    """Vertices of a prism along z, in the unit circle."""
+    angles = 2.0 * np.pi * np.arange(corners) / corners
+    x, y = np.tile(np.cos(angles), 2), np.tile(np.sin(angles), 2)
+    return np.array([x, y, np.repeat([-1.0, 1.0], corners)]).T
+
+
+@pytest.mark.parametrize(("upper", "lower"), [(64, 64), (64, 7), (16, 16), (40, None)])
+def test_faces_of_many_corners_touch_all_around(upper, lower):
+    """Of a face that has more corners than there is room for, and where clipping makes more: some
+    lie near each end of its border. A prism on a plane has 16 at most."""
+    kinds, ways = (HULL, HULL if lower else PLANE), (prism(upper), prism(lower or 4))
+    pair = finder(kinds, [[0.5, 0.5, 0.3], [0.5, 0.5, 0.3]], ways)
+    r, p = np.zeros((2, 3)), np.array([[np.cos(0.1), 0, 0, np.sin(0.1)], [1.0, 0, 0, 0]])
+    r[0, 2] = 1e-9 + (0.6 if lower else 0.3)
+    found = pair.find(r, p, np.full(3, 1e-3))
+    assert found.gap == pytest.approx([1e-9] * len(found.gap), abs=1e-15)
+    for angle in np.linspace(0.0, 2.0 * np.pi, 50):
+        far = found.point[:, :2] @ [np.cos(angle), np.sin(angle)]
+        assert far.max() > 0.5 * (0.97 if lower != 7 else np.cos(np.pi / 7) - 0.03)
+    assert lower or 14 < len(found.gap) <= 16
+
+
+@pytest.mark.parametrize("part", [0.5, 0.95, 0.999])
+@pytest.mark.parametrize("kind", [CAPSULE, CYLINDER, BOX, "stands"])
+def test_what_touches_a_cap_next_to_its_rim_touches_it(kind, part):
+    """Rods across it, the corner of a box and another cap, that reach to a part of its radius where
+    its own points are farthest: between two of them the chord is at 0.92."""
+    angle, radius = np.pi / 8, 0.5
+    c, s = np.cos(0.5 * angle), np.sin(0.5 * angle)
+    turned = np.array([c, 0.0, 0.0, s])
+    if kind in (CAPSULE, CYLINDER):  # z along y, before
+        lies = np.array([c, c, s, s]) / np.sqrt(2)
+        sizes, p, out, up = [0.1, 2.0, 0.0], lies, 0.0, 0.1
+    elif kind == BOX:  # a corner inwards
+        half = 0.5 * (angle + 0.25 * np.pi)
+        sizes, p = [0.2] * 3, np.array([np.cos(half), 0.0, 0.0, np.sin(half)])
+        out, up = 0.2 * np.sqrt(2), 0.2
+    else:
+        sizes, p, out, up = [0.3, 0.2, 0.0], turned, 0.3, 0.2
+    pair = finder([CYLINDER, CYLINDER if kind == "stands" else kind], [[radius, 0.3, 0.0], sizes])
+    way = np.array([np.cos(angle), np.sin(angle)])
+    r = np.array([np.zeros(3), [*((part * radius + out) * way), 0.3 + up + 1e-9]])
+    found = pair.find(r, np.array([[1.0, 0, 0, 0], p]), np.full(3, 1e-3))
+    assert len(found.gap) >= 2
+    assert found.gap == pytest.approx([1e-9] * len(found.gap), abs=1e-15)
+    assert np.linalg.norm(found.point[:, :2], axis=1).max() < radius * (1.0 + 1e-8)
+    assert (found.point[:, :2] @ way).min() == pytest.approx(part * radius, abs=1e-9) or part == 0.5
 
 
 def test_boxes_meet_where_their_faces_and_edges_do():

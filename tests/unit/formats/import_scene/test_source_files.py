@@ -59,6 +59,21 @@ def test_frames_of_included_models(tmp_path):
     np.testing.assert_allclose(point.sPp, (0.5, 0, 0), atol=1e-15)
 
 
+def test_models_within_the_only_model_of_a_file_lie_in_its_frame(tmp_path):
+    """Both that written there, and that included, half a metre along its x, which is ground's y."""
+    (tmp_path / "finger.sdf").write_text(INNER.replace("0 0.2 0 0", "0 0.0 0 0"))
+    inertial = "<inertial><mass>1</mass></inertial></link>"
+    place = "<pose>0.5 0 0 0 0 0</pose>"
+    (tmp_path / "hand.sdf").write_text(
+        '<sdf version="1.9"><model name="hand"><pose>1 2 3 0 0 1.5707963267948966</pose>'
+        f'<link name="palm">{inertial}<model name="thumb">{place}<link name="tip">{inertial}'
+        f"</model><include><uri>finger.sdf</uri><name>little</name>{place}</include></model></sdf>"
+    )
+    scene, _ = dap.import_model(tmp_path / "hand.sdf")
+    for name in ("thumb::tip", "little::tip"):
+        np.testing.assert_allclose(scene.bodies[name].r, [1.0, 2.5, 3.0], atol=1e-15)
+
+
 @pytest.mark.parametrize(
     ("data", "found"),
     [
