@@ -66,7 +66,8 @@ def inputs_of(point: OperatingPoint, names: Sequence[str]) -> Inputs:
     """
     wrench = np.zeros((6 * point.model.body_count, len(names)))
     rate = np.zeros((point.model.state_count, len(names)))
-    units, numbers, notes = [], [], []
+    units, notes = [], []
+    numbers: list[tuple[str, int] | None] = []
     drivers: list[list[Floats]] = []
     driver = np.zeros((len(names), len(names)))
     with point.compiled.borrow_evaluator() as evaluator:

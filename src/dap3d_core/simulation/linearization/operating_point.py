@@ -222,6 +222,12 @@ def _state(
         if k < 0 or abs(at.t[k] - t) > SAME_INSTANT * span:
             near = f"; the nearest is t = {at.t[k]:.9g} s" if k >= 0 else ""
             raise SimulationError(f"the result has no instant at t = {t:.9g} s{near}")
+        if changed := sorted({n for e in at.events if e.t <= at.t[k] for n in e.changes}):
+            raise SimulationError(
+                f"an event changed numbers of {', '.join(changed)} in the course of the run, which "
+                "the scene does not have: put them into the scene, and linearize at the state, "
+                "at=result.u[k]"
+            )
         angles = np.zeros(model.angle_count)
         known = at.arrays.angles[k]  # an older file has no angles of joints
         if known.size not in (model.own_angle_count, model.angle_count):

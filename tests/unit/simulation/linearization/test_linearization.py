@@ -68,8 +68,8 @@ def test_parameters_as_inputs():
 @long_in_plain_python
 def test_outputs_that_read_inputs():
     """What an input does to an output by itself: as the force that it sets, by a state that lags,
-    in an expression and in an energy. By hand: a mass on a spring has x / F = 1 / (2 s^2 + 3 s + 40),
-    the lag 1 / (1 + 0.1 s); of the spring, stretched by 0.1 m, V = k d^2 / 2."""
+    in an expression and in an energy. By hand: a mass on a spring has x / F =
+    1 / (2 s^2 + 3 s + 40), the lag 1 / (1 + 0.1 s); of the spring, 0.1 m longer, V = k d^2 / 2."""
     scene = dap.Scene(name="slider")
     for name in ("u", "w"):
         scene.add_input(name, 0.0)
@@ -93,7 +93,7 @@ def test_outputs_that_read_inputs():
     inputs = ("spring.k", "spring.l0")
     lin = dap.linearize(scene, inputs=inputs, outputs=("energy.potential", "spring.tension"))
     by_motion = np.outer([4.0, 40.0 + 3.0 * s], [-0.1 * x, 40.0 * x])
-    expected = by_motion + [[0.5 * 0.01, -40.0 * 0.1], [0.1, -40.0]]
+    expected = by_motion + np.array([[0.5 * 0.01, -40.0 * 0.1], [0.1, -40.0]])
     np.testing.assert_allclose(transfer(lin, s), expected, rtol=1e-10)
     with pytest.raises(UnknownNameError, match="a factor of which is an input"):
         dap.linearize(scene, inputs=("spring",), outputs=("energy.total",))
