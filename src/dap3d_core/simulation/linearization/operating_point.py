@@ -222,12 +222,7 @@ def _state(
         if k < 0 or abs(at.t[k] - t) > SAME_INSTANT * span:
             near = f"; the nearest is t = {at.t[k]:.9g} s" if k >= 0 else ""
             raise SimulationError(f"the result has no instant at t = {t:.9g} s{near}")
-        if changed := sorted({n for e in at.events if e.t <= at.t[k] for n in e.changes}):
-            raise SimulationError(
-                f"an event changed numbers of {', '.join(changed)} in the course of the run, which "
-                "the scene does not have: put them into the scene, and linearize at the state, "
-                "at=result.u[k]"
-            )
+        _refuse_changed(compiled.scene, at, float(at.t[k]))
         angles = np.zeros(model.angle_count)
         known = at.arrays.angles[k]  # an older file has no angles of joints
         if known.size not in (model.own_angle_count, model.angle_count):
@@ -244,6 +239,22 @@ def _state(
         u = join(r, p, np.zeros_like(r), np.zeros_like(r))
         return u, getattr(at, "angles", None), getattr(at, "states", None)
     return state_of(at, model.body_names), None, None
+
+
+def _refuse_changed(scene: Scene, result: Result, t: float) -> None:
+    """Refuses forces that by t an event gave other numbers than they have in the scene."""
+    now = {
+        (force, field): value
+        for event in result.events if event.t <= t
+        for force, fields in event.changes.items() if force in scene.forces
+        for field, value in fields.items()
+    }  # fmt: skip
+    for (force, field), value in now.items():
+        if not np.array_equal(scene.forces[force].fields.get(field), value):
+            raise SimulationError(
+                f"an event of the run has set {field} = {value} of force {force}: give it to the "
+                "scene, too, to linearize it there"
+            )
 
 
 def _check(evaluator: Evaluator, t: float, u: Floats) -> None:

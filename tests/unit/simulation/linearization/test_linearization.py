@@ -125,6 +125,18 @@ def test_state_of_a_result():
         dap.linearize("pen1", at=run)
 
 
+def test_numbers_that_an_event_has_changed():
+    """A run whose event made the spring stiffer is linearised with that stiffness or not at all."""
+    event = dap.Event(lambda t, _: t - 0.3, action=lambda state: state.set("spring", k=160.0))
+    run = dap.simulate(cart(), t_end=0.5, dt=0.25, events=[event])
+    scene = cart()
+    soft = dap.linearize(scene, at=run, t=0.25)
+    with pytest.raises(dap.SimulationError, match=r"has set k = 160\.0 of force spring"):
+        dap.linearize(scene, at=run, t=0.5)
+    scene.forces["spring"].fields["k"] = 160.0
+    assert abs(dap.linearize(scene, at=run, t=0.5).A[2, 0] / soft.A[2, 0]) > 2.0
+
+
 def test_counted_turns_of_a_result():
     """A spring that counts whole turns has the moment there that the run has there."""
 
