@@ -250,7 +250,8 @@ def _refuse_changed(scene: Scene, result: Result, t: float) -> None:
         for field, value in fields.items()
     }  # fmt: skip
     for (force, field), value in now.items():
-        if not np.array_equal(scene.forces[force].fields.get(field), value):
+        own: Any = scene.forces[force].fields.get(field)
+        if not np.array_equal(own, value):
             raise SimulationError(
                 f"an event of the run has set {field} = {value} of force {force}: give it to the "
                 "scene, too, to linearize it there"
