@@ -7,8 +7,7 @@ multipliers follow the linear equations there, so that what is differentiated is
 """
 
 from collections.abc import Sequence
-from functools import partial
-from typing import Any
+from typing import Any, NoReturn
 
 import attrs
 import numpy as np
@@ -16,9 +15,10 @@ import numpy as np
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.interface.codegen.loop_derivatives import differentiate_loop
+from dap3d_core.interface.codegen.loop_source import computes_rate
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.model import Group
+from dap3d_core.model import Group, Model
 from dap3d_core.model.element_states import first_states
 from dap3d_core.model.state_layout import split
 from dap3d_core.result import Result, RunMetadata, find
@@ -42,7 +42,9 @@ class Inputs:
         driver: (drivers, inputs) accelerations of drivers.
         rows: of these drivers; None where there are none.
         units: SI units of the inputs.
-        elements: names of the forces that inputs change.
+        numbers: array of the evaluator and place in it, flat, of the number that an input is; None
+            of factors and drivers.
+        factors: names of the forces of which an input is a factor.
         notes: of inputs that have no effect.
     """
 
@@ -51,7 +53,8 @@ class Inputs:
     driver: Floats
     rows: DriverRows | None
     units: tuple[str, ...]
-    elements: frozenset[str]
+    numbers: tuple[tuple[str, int] | None, ...]
+    factors: frozenset[str]
     notes: tuple[str, ...]
 
 
@@ -63,7 +66,8 @@ def inputs_of(point: OperatingPoint, names: Sequence[str]) -> Inputs:
     """
     wrench = np.zeros((6 * point.model.body_count, len(names)))
     rate = np.zeros((point.model.state_count, len(names)))
-    units, elements, notes = [], [], []
+    units, notes = [], []
+    numbers: list[tuple[str, int] | None] = []
     drivers: list[list[Floats]] = []
     driver = np.zeros((len(names), len(names)))
     with point.compiled.borrow_evaluator() as evaluator:
@@ -72,19 +76,18 @@ def inputs_of(point: OperatingPoint, names: Sequence[str]) -> Inputs:
         for k, name in enumerate(names):
             element = name.partition(".")[0]
             if name in point.model.input_names:
-                wrench[:, k] = _by_input(point, evaluator, name)
+                numbers.append(_by_input(point, evaluator, name, wrench[:, k], rate[:, k]))
                 units.append("1")
-                if not np.any(wrench[:, k]):
-                    notes.append(f"input {name} has no effect at this state")
-                continue
-            if element not in point.model.force_names:
+            elif element not in point.model.force_names:
                 driver[len(drivers), k] = 1.0
                 drivers.append(_driver(point, evaluator, name))
+                numbers.append(None)
                 units.append("SI")
                 continue
-            unit = _force(point, evaluator, name, wrench[:, k], rate[:, k])
-            units.append(unit)
-            elements.append(element)
+            else:
+                unit, number = _force(point, evaluator, name, wrench[:, k], rate[:, k])
+                units.append(unit)
+                numbers.append(number)
             if not np.any(wrench[:, k]) and not np.any(rate[:, k]):
                 notes.append(f"input {name} has no effect at this state")
     rows = None
@@ -92,37 +95,66 @@ def inputs_of(point: OperatingPoint, names: Sequence[str]) -> Inputs:
         by = np.array(drivers).transpose(1, 2, 0)
         rows = DriverRows(nu=(by[0], by[1]), gamma=(by[2], by[3], by[4]))
     driver = driver[: len(drivers)]
-    return Inputs(wrench, rate, driver, rows, tuple(units), frozenset(elements), tuple(notes))
+    factors = frozenset(name for name in names if name in point.model.force_names)
+    return Inputs(wrench, rate, driver, rows, tuple(units), tuple(numbers), factors, tuple(notes))
 
 
-def _by_input(point: OperatingPoint, evaluator: Evaluator, name: str) -> Floats:
-    """(6 n,) derivative of all forces by an input of the scene.
+def _by_input(
+    point: OperatingPoint, evaluator: Evaluator, name: str, wrench: Floats, rate: Floats
+) -> tuple[str, int]:
+    """Add the derivatives of all forces (6 n,) and rates of states (s,) by an input of the scene.
+
+    Returns:
+        where its number is.
 
     Raises:
-        UnknownNameError: a driver reads it.
+        UnknownNameError: a driver reads it, or a force on reactions.
     """
     model = point.model
     row = int(model.input_rows[model.input_names.index(name)])
-    result = np.zeros((model.body_count + 1, 6))
     for loop, (kind, group) in enumerate(evaluator.loop_groups):
-        columns = range(len(group.type_info.layout.functions))
-        for column in columns if kind in ("wrench", "acceleration") else ():
+        for column in range(len(group.type_info.layout.functions)):
             mine = group.functions[:, column] == row
-            if np.any(mine) and kind == "acceleration":
-                joint = model.joint_names[int(group.members[np.argmax(mine)])]
-                raise UnknownNameError(
-                    f"input {name!r} is read by the driver {joint}, whose velocity jumps with it: "
-                    "equations of motion have no such input; drive it by a function, and name "
-                    f"{joint}"
-                )
-            if np.any(mine):
-                own = differentiate_loop(
-                    group.type_info, kind, point.t, evaluator.system,
-                    evaluator.system.groups[loop].tolist(), functions=[(column, 0)],
-                )  # fmt: skip
-                slope = own.outputs["wrench"][1][..., -1]
-                np.add.at(result, own.bodies[mine][:, : slope.shape[1]], slope[mine])
-    return result[1:].ravel()
+            if kind == "wrench" and np.any(mine):
+                _add(point, evaluator, loop, mine, wrench, rate, functions=[(column, 0)])
+            elif kind in ("friction", "acceleration") and np.any(mine):
+                _refuse_input(model, name, kind, int(group.members[np.argmax(mine)]))
+    return "F", row * evaluator.system.F.shape[1]
+
+
+def _add(
+    point: OperatingPoint, evaluator: Evaluator, loop: int, mine: Any, wrench: Floats,
+    rate: Floats, **by: Any,
+) -> None:  # fmt: skip
+    """Add what instances of a loop exert, or its derivative and that of rates by a number of each.
+
+    Args:
+        mine: (m,) True for these instances.
+        by: ``numbers`` or ``functions`` of ``differentiate_loop``, one of them.
+    """
+    group, first = evaluator.loop_groups[loop][1], tuple(evaluator.system.groups[loop].tolist())
+    for what in ("wrench", "rate") if by and computes_rate(group.type_info) else ("wrench",):
+        own = differentiate_loop(group.type_info, what, point.t, evaluator.system, first, **by)
+        value, slope = own.outputs[what]
+        part = (slope[..., -1] if by else value)[mine]
+        if what == "wrench":  # (m, slots, 6)
+            forces = np.zeros((point.model.body_count + 1, 6))
+            np.add.at(forces, own.bodies[mine][:, : part.shape[1]], part)
+            wrench += forces[1:].ravel()
+        else:
+            places = first_states(point.model.acting, group)[mine, None]
+            rate[places + np.arange(part.shape[1])] += part
+
+
+def _refuse_input(model: Model, name: str, kind: str, element: int) -> NoReturn:
+    if kind == "friction":
+        words = f"{model.force_names[element]}, which reads it, acts by reactions of joints"
+        raise UnknownNameError(f"input {name!r}: {words}")
+    joint = model.joint_names[element]
+    raise UnknownNameError(
+        f"input {name!r} is read by the driver {joint}, whose velocity jumps with it: equations "
+        f"of motion have no such input; drive it by a function, and name {joint}"
+    )
 
 
 def _has_one_function(group: Group) -> bool:
@@ -168,30 +200,21 @@ def _inputs_known(point: OperatingPoint, evaluator: Evaluator) -> list[str]:
 
 def _force(
     point: OperatingPoint, evaluator: Evaluator, name: str, wrench: Floats, rate: Floats
-) -> str:
-    """Forces (6 n,) and rates of states (s,) by a unit input; returns the unit of the input."""
+) -> tuple[str, tuple[str, int] | None]:
+    """Forces (6 n,) and rates of states (s,) by a unit input; its unit, and where its number is."""
     element, _, field = name.partition(".")
     number = point.model.force_names.index(element)
     for loop, (kind, group) in enumerate(evaluator.loop_groups):
         if kind == "wrench" and number in group.members:
             unit, columns = _columns(group, name, field) if field else ("1", [])
-            differentiated = partial(
-                differentiate_loop, group.type_info, t=point.t, arrays=evaluator.system,
-                group=tuple(evaluator.system.groups[loop].tolist()), numbers=columns,
-            )  # fmt: skip
             mine = group.members == number
-            own = differentiated(what="wrench")
-            value, slope = own.outputs["wrench"]
-            part = slope[..., -1] if columns else value  # (m, slots, 6)
-            forces = np.zeros((point.model.body_count + 1, 6))
-            np.add.at(forces, own.bodies[mine][:, : value.shape[1]], part[mine])
-            wrench[:] = forces[1:].ravel()
-            if columns and group.type_info.layout.states:
-                slope = differentiated(what="rate").outputs["rate"][1][..., -1]
-                firsts = first_states(point.model.acting, group)
-                for first, part in zip(firsts[mine], slope[mine], strict=True):
-                    rate[first : first + len(part)] = part
-            return unit
+            by = {"numbers": columns} if columns else {}
+            _add(point, evaluator, loop, mine, wrench, rate, **by)
+            if not columns:
+                return unit, None
+            first = int(evaluator.system.groups[loop, 1])
+            place = int(np.argmax(mine)) * group.type_info.layout.par_width + columns[0]
+            return unit, ("par", first + place)
     raise UnknownNameError(f"input {name!r}: {element} acts by reactions of joints alone")
 
 
@@ -261,22 +284,82 @@ def output_derivatives(
         for h, direction in zip(steps, directions, strict=True)
         for x in ABSCISSAE
     ]
-    rows.append(_row(point, 0.0, directions[0] if directions else (none,) * 4 + (unmoved,)))
+    rest = (none, none, none, np.zeros_like(point.tangent.multipliers), unmoved)
+    values = _values(point, [*rows, _row(point, 0.0, rest)], names, inputs.factors)
+    matrix = _slopes(values[:, :-1] - values[:, -1:]) / steps
+    for k, number in enumerate(inputs.numbers):
+        if number is not None:
+            matrix[:, states + k] += _by_number(point, *number, rest, names, values[:, -1:])
+    return matrix[:, :states], matrix[:, states:]
+
+
+def _slopes(values: Floats) -> Floats:
+    """(outputs, d) differences of values (outputs, abscissae of d directions), of unit steps."""
+    return values.reshape(len(values), -1, len(ABSCISSAE)) @ WEIGHTS
+
+
+def _values(
+    point: OperatingPoint, rows: list[Floats], names: Sequence[str], factors: frozenset[str]
+) -> Floats:
+    """(outputs, rows) quantities at reported rows; errors as of ``output_derivatives``."""
     record = RunMetadata(scene_text=point.compiled.scene_text)
     result = Result.of_run(point.model, np.array(rows), record, lambda: point.evaluator)
-    matrix = np.zeros((len(names), len(directions)))
+    values = np.zeros((len(names), len(rows)))
     for k, name in enumerate(names):
         quantity = find(result, name)
         if quantity.values.ndim > 1:
             first = quantity.components[0] if quantity.components else "1"
             raise UnknownNameError(f"output {name!r} has components: name one, as {name}.{first}")
-        if name.partition(".")[0] in inputs.elements and quantity.owner == "force":
-            raise UnknownNameError(f"output {name!r} belongs to a force that is an input")
+        if factor := _factor_in(point.model, result, name, factors):
+            raise UnknownNameError(
+                f"output {name!r} depends on {factor} itself, a factor of which is an input; "
+                f"name a number of it, as {factor}.FIELD"
+            )
+        if "work" in _read_by(result, name):
+            raise UnknownNameError(f"output {name!r}: work depends on the way, not on the state")
         if not np.isfinite(quantity.values[-1]):
             raise UnknownNameError(f"output {name!r} has no value at this state")
-        values = quantity.values[:-1].reshape(-1, len(ABSCISSAE))
-        matrix[k] = (values - quantity.values[-1]) @ WEIGHTS / steps
-    return matrix[:, :states], matrix[:, states:]
+        values[k] = quantity.values
+    return values
+
+
+def _read_by(result: Result, name: str) -> set[str]:
+    """Names of the quantities that a quantity is, or is computed from."""
+    head = name.partition(".")[0]
+    operands = find(result, head).operands if head in result.outputs else ()
+    return {name}.union(*(_read_by(result, operand) for operand in operands))
+
+
+def _factor_in(model: Model, result: Result, name: str, factors: frozenset[str]) -> str:
+    """A force with a factor as an input on which a quantity depends by itself; "" for none."""
+    for read in _read_by(result, name) if factors else ():
+        element = read.partition(".")[0]
+        if element in factors and find(result, read).owner == "force":
+            return element
+        for group in model.forces if read in ("energy.potential", "energy.total") else ():
+            for member in group.members if "energy" in group.type_info.kernels else ():
+                if model.force_names[int(member)] in factors:
+                    return model.force_names[int(member)]
+    return ""
+
+
+def _by_number(
+    point: OperatingPoint, array: str, place: int, rest: Any, names: Sequence[str], given: Floats
+) -> Floats:
+    """(outputs,) derivatives of quantities, (outputs, 1) as given, by a number that elements read,
+    in a state and motion that stay.
+    """
+    numbers = getattr(point.evaluator.system, array).reshape(-1)
+    number = float(numbers[place])
+    h = STEP * (abs(number) or 1.0)
+    columns = []
+    try:
+        for x in ABSCISSAE:
+            numbers[place] = number + x * h
+            columns.append(_values(point, [_row(point, 0.0, rest)], names, frozenset()))
+    finally:
+        numbers[place] = number
+    return _slopes(np.hstack(columns) - given)[:, 0] / h
 
 
 def _step(point: OperatingPoint, *direction: Floats) -> float:

@@ -222,6 +222,7 @@ def _state(
         if k < 0 or abs(at.t[k] - t) > SAME_INSTANT * span:
             near = f"; the nearest is t = {at.t[k]:.9g} s" if k >= 0 else ""
             raise SimulationError(f"the result has no instant at t = {t:.9g} s{near}")
+        _refuse_changed(compiled.scene, at, float(at.t[k]))
         angles = np.zeros(model.angle_count)
         known = at.arrays.angles[k]  # an older file has no angles of joints
         if known.size not in (model.own_angle_count, model.angle_count):
@@ -238,6 +239,23 @@ def _state(
         u = join(r, p, np.zeros_like(r), np.zeros_like(r))
         return u, getattr(at, "angles", None), getattr(at, "states", None)
     return state_of(at, model.body_names), None, None
+
+
+def _refuse_changed(scene: Scene, result: Result, t: float) -> None:
+    """Refuses forces that by t an event gave other numbers than they have in the scene."""
+    now = {
+        (force, field): value
+        for event in result.events if event.t <= t
+        for force, fields in event.changes.items() if force in scene.forces
+        for field, value in fields.items()
+    }  # fmt: skip
+    for (force, field), value in now.items():
+        own: Any = scene.forces[force].fields.get(field)
+        if not np.array_equal(own, value):
+            raise SimulationError(
+                f"an event of the run has set {field} = {value} of force {force}: give it to the "
+                "scene, too, to linearize it there"
+            )
 
 
 def _check(evaluator: Evaluator, t: float, u: Floats) -> None:

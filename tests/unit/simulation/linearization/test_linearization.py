@@ -66,6 +66,39 @@ def test_parameters_as_inputs():
 
 
 @long_in_plain_python
+def test_outputs_that_read_inputs():
+    """What an input does to an output by itself: as the force that it sets, by a state that lags,
+    in an expression and in an energy. By hand: a mass on a spring has x / F =
+    1 / (2 s^2 + 3 s + 40), the lag 1 / (1 + 0.1 s); of the spring, 0.1 m longer, V = k d^2 / 2."""
+    scene = dap.Scene(name="slider")
+    for name in ("u", "w"):
+        scene.add_input(name, 0.0)
+    scene.add_body("cart", mass=2.0, Jp=np.diag([0.1, 0.1, 0.1]), r=[0, 0, 0])
+    scene.add_point("wall", "ground", [-1.0, 0, 0])
+    scene.add_joint("tran", "rail", P_i="cart.O", P_j="ground.O", a_j="ground.x")
+    scene.add_force("ptp", "spring", P_i="cart.O", P_j="wall", k=40.0, c=3.0, l0=0.9)
+    scene.add_force(
+        "actuator", "lags", joint="rail", control="u", gain=2.0, activation="lag", time=0.1
+    )
+    scene.add_force("f", "push", body_i="cart", f=[3.0, 0, 0], input="w")
+    scene.add_output("sum_of_it", "2 * push.force.x + w")
+    outputs = ("cart.r.x", "lags.force.x", "push.force.x", "sum_of_it", "w")
+    lin = dap.linearize(scene, inputs=("u", "w"), outputs=outputs)
+    assert not any("no effect" in note for note in lin.notes)
+    s = 0.3 + 1.1j
+    x, lag = 1.0 / (2.0 * s**2 + 3.0 * s + 40.0), 2.0 / (1.0 + 0.1 * s)
+    expected = np.array([[lag * x, lag, 0.0, 0.0, 0.0], [3.0 * x, 0.0, 3.0, 7.0, 1.0]]).T
+    np.testing.assert_allclose(transfer(lin, s), expected, rtol=1e-10, atol=1e-11)
+
+    inputs = ("spring.k", "spring.l0")
+    lin = dap.linearize(scene, inputs=inputs, outputs=("energy.potential", "spring.tension"))
+    by_motion = np.outer([4.0, 40.0 + 3.0 * s], [-0.1 * x, 40.0 * x])
+    expected = by_motion + np.array([[0.5 * 0.01, -40.0 * 0.1], [0.1, -40.0]])
+    np.testing.assert_allclose(transfer(lin, s), expected, rtol=1e-10)
+    with pytest.raises(UnknownNameError, match="a factor of which is an input"):
+        dap.linearize(scene, inputs=("spring",), outputs=("energy.total",))
+
+
 def test_state_space_follows_the_motion():
     """After a small kick the simulated motion is that of z_dot = A z."""
     kick = 1e-5
@@ -90,6 +123,18 @@ def test_state_of_a_result():
         dap.linearize(cart(), at=run, t=0.6)
     with pytest.raises(dap.SimulationError, match="of another scene"):
         dap.linearize("pen1", at=run)
+
+
+def test_numbers_that_an_event_has_changed():
+    """A run whose event made the spring stiffer is linearised with that stiffness or not at all."""
+    event = dap.Event(lambda t, _: t - 0.3, action=lambda state: state.set("spring", k=160.0))
+    run = dap.simulate(cart(), t_end=0.5, dt=0.25, events=[event])
+    scene = cart()
+    soft = dap.linearize(scene, at=run, t=0.25)
+    with pytest.raises(dap.SimulationError, match=r"has set k = 160\.0 of force spring"):
+        dap.linearize(scene, at=run, t=0.5)
+    scene.forces["spring"].fields["k"] = 160.0
+    assert abs(dap.linearize(scene, at=run, t=0.5).A[2, 0] / soft.A[2, 0]) > 2.0
 
 
 def test_counted_turns_of_a_result():
@@ -133,7 +178,8 @@ def test_equilibrium_is_at_rest():
         ({"inputs": ("rail.k",)}, r"no input, force or driver 'rail'"),
         ({"outputs": ("cart.r.y_",)}, r"did you mean 'cart\.r\.[xyz]'"),
         ({"outputs": ("cart.r",)}, r"has components: name one, as cart\.r\.x"),
-        ({"inputs": ("spring.k",), "outputs": ("spring.tension",)}, "force that is an input"),
+        ({"inputs": ("spring",), "outputs": ("spring.tension",)}, "a factor of which is an input"),
+        ({"outputs": ("work",)}, "work depends on the way"),
     ],
 )
 def test_unknown_names(settings, words):
