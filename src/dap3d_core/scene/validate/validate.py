@@ -41,8 +41,12 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     from dap3d_core.scene.validate.settings import check_header, check_settings, notes_of
     from dap3d_core.scene.validate.types import Types
 
-    scene = scene.resolved()
     report = Collector(scene)
+    if scene.parameters:
+        from dap3d_core.scene.expressions.parameters import put_numbers
+
+        report = Collector(scene.copy())
+        put_numbers(report)
     _check_names(report)
     bodies = read_bodies(report)
     geometry = read_geometry(report, bodies)
@@ -57,16 +61,16 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     left = bool(contacts or collisions)
     forces = _acting_forces(report, geometry, types, others, left=left)
     check_header(report)
-    check_settings(report, scene.simulation, bodies.body_names, ("simulation",))
+    check_settings(report, report.scene.simulation, bodies.body_names, ("simulation",))
     report.raise_mistakes()
 
     types.note_unused_file()
     acting = [*joints, *forces, *contacts]
     _note_loose_bodies(report, bodies, acting, collisions)
     _note_unused_signals(report, acting, functions)
-    notes = [*report.notes(), *notes_of(scene.simulation), *types.registry.notes]
+    notes = [*report.notes(), *notes_of(report.scene.simulation), *types.registry.notes]
     return ValidatedScene(
-        scene=scene,
+        scene=report.scene,
         registry=types.registry,
         **attrs.asdict(bodies, recurse=False),
         point_names=geometry.point_names,
