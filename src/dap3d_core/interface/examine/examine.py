@@ -6,6 +6,7 @@ A wrong shape, an unknown name, a velocity in a position-level kernel or an exce
 
 import math
 import random
+import re
 from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
 from keyword import iskeyword
@@ -52,6 +53,8 @@ from dap3d_core.interface.examine.random_values import (
 from dap3d_core.interface.fields import SLOTS, sized_fields, slot_of, specs_of
 from dap3d_core.interface.types import SYMBOLS, BodyPose, Force, Function, Joint, TypeBase
 
+#: What a scene names a type by, after the distribution and a colon where two have one of its name.
+KEYWORD = re.compile(r"\w(?:[\w.-]*\w)?")
 #: Random inputs a type may refuse, or be undefined for, before it counts as broken.
 ATTEMPTS = 200
 
@@ -318,6 +321,11 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
     if not type_.keyword:
         example = f'keyword = "{type_.__name__.lower()}"'
         raise PluginError(f"{who} has no keyword; add e.g. {example}, without an annotation")
+    if not KEYWORD.fullmatch(type_.keyword):
+        raise PluginError(
+            f"{who}: keyword = {type_.keyword!r} is no word; use letters, digits, and - _ . "
+            "between them"
+        )
     for field in attrs.fields(type_):  # type: ignore[arg-type]
         if "dap3d" not in field.metadata and field.default is attrs.NOTHING:
             raise PluginError(f"{who}: {no_field(type_, field.name)}")
