@@ -118,7 +118,10 @@ BAD_CONTENT = {
     "truncated list": (TEXT.encode()[:-6], [":6:", "not valid TOML"]),
     "truncated text": (b'[scene]\nname = "sm', ["not valid TOML", "end of the file"]),
     "key twice": (TEXT.encode() + b"mass = 2.0\n", [":7:", "mass is there twice, first in line 5"]),
-    "table twice": (TEXT.encode() + b"[bodies.a]\n", [":7:", "bodies.a is there twice, first in line 4"]),
+    "table twice": (
+        TEXT.encode() + b"[bodies.a]\n",
+        [":7:", "bodies.a is there twice, first in line 4"],
+    ),
     "no value": (b"[scene]\nname =\n", [":2:", "line 2, column 7"]),
     "word": (b"[scene]\nname = small\n", [":2:", "column 8", "in quotes"]),
     "deep": (b"x = " + b"[" * 100_000, ["nested too deeply"]),
