@@ -41,12 +41,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     from dap3d_core.scene.validate.settings import check_header, check_settings, notes_of
     from dap3d_core.scene.validate.types import Types
 
-    report = Collector(scene)
-    if scene.parameters:
-        from dap3d_core.scene.expressions.parameters import put_numbers
-
-        report = Collector(scene.copy())
-        put_numbers(report)
+    report = _collector(scene)
     _check_names(report)
     bodies = read_bodies(report)
     geometry = read_geometry(report, bodies)
@@ -85,6 +80,17 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
         inputs=inputs,
         notes=notes,
     )
+
+
+def _collector(scene: Scene) -> Collector:
+    """The collector of a scene, with numbers in place of expressions of its parameters."""
+    if not scene.parameters:
+        return Collector(scene)
+    from dap3d_core.scene.expressions.parameters import put_numbers
+
+    report = Collector(scene.copy())
+    put_numbers(report)
+    return report
 
 
 def _check_names(report: Collector) -> None:
