@@ -307,6 +307,7 @@ def _parse(text: str, path: Path) -> dict[str, Any]:
         return data
     place = re.search(r"\(at line (\d+), column (\d+)\)", words)
     what = re.sub(r"\s*\(at [^()]*\)$", "", words)
+    line: int | None
     if place is not None:
         line = int(place[1])
         what = f"{what} at line {line}, column {place[2]}"

@@ -41,6 +41,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     from dap3d_core.scene.validate.settings import check_header, check_settings, notes_of
     from dap3d_core.scene.validate.types import Types
 
+    scene = scene.copy() if scene.parameters else scene
     report = _collector(scene)
     _check_names(report)
     bodies = read_bodies(report)
@@ -56,16 +57,16 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     left = bool(contacts or collisions)
     forces = _acting_forces(report, geometry, types, others, left=left)
     check_header(report)
-    check_settings(report, report.scene.simulation, bodies.body_names, ("simulation",))
+    check_settings(report, scene.simulation, bodies.body_names, ("simulation",))
     report.raise_mistakes()
 
     types.note_unused_file()
     acting = [*joints, *forces, *contacts]
     _note_loose_bodies(report, bodies, acting, collisions)
     _note_unused_signals(report, acting, functions)
-    notes = [*report.notes(), *notes_of(report.scene.simulation), *types.registry.notes]
+    notes = [*report.notes(), *notes_of(scene.simulation), *types.registry.notes]
     return ValidatedScene(
-        scene=report.scene,
+        scene=scene,
         registry=types.registry,
         **attrs.asdict(bodies, recurse=False),
         point_names=geometry.point_names,
@@ -83,13 +84,12 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
 
 
 def _collector(scene: Scene) -> Collector:
-    """The collector of a scene, with numbers in place of expressions of its parameters."""
-    if not scene.parameters:
-        return Collector(scene)
-    from dap3d_core.scene.expressions.parameters import put_numbers
+    """The collector of a scene, in which numbers are put in place of expressions of parameters."""
+    report = Collector(scene)
+    if scene.parameters:
+        from dap3d_core.scene.expressions.parameters import put_numbers
 
-    report = Collector(scene.copy())
-    put_numbers(report)
+        put_numbers(report)
     return report
 
 

@@ -16,7 +16,7 @@ CORNERS = 48
 
 def contact_shapes(model: Model) -> list[Shape]:
     """The surfaces that the types of a model's contacts declare, each once."""
-    found = {}
+    found: dict[str, Shape] = {}
     for group in model.contacts:
         for k, member in enumerate(group.members):
             name, _, point = model.joint_names[int(member)].partition("#")
