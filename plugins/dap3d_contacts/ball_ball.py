@@ -24,6 +24,7 @@ class BallBall(Contact):
     """
 
     keyword = "ball_ball"
+    surfaces: ClassVar[Mapping[str, str]] = {"i": "sphere", "j": "shell"}
     example: ClassVar[Mapping[str, str]] = {"P_j": '"rod.O"', "radius_i": "0.1", "radius_j": "0.1"}
     P_i: Point = point(doc="centre of a ball")
     radius_i: float = number(unit="m", minimum=0.0, doc="of the ball about P_i")

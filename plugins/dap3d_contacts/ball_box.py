@@ -52,6 +52,7 @@ class BallBox(Contact):
     """
 
     keyword = "ball_box"
+    surfaces: ClassVar[Mapping[str, str]] = {"i": "sphere", "j": "box"}
     example: ClassVar[Mapping[str, str]] = {
         "P_j": '"rod.O"', "radius": "0.1", "size": "[0.2, 0.3, 0.4]",
     }  # fmt: skip

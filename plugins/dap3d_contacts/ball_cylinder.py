@@ -43,6 +43,7 @@ class BallCylinder(Contact):
     """
 
     keyword = "ball_cylinder"
+    surfaces: ClassVar[Mapping[str, str]] = {"i": "sphere", "j": "cylinder"}
     example: ClassVar[Mapping[str, str]] = {
         "P_j": '"rod.O"', "a_j": '"rod.z"', "radius_i": "0.1", "radius_j": "0.1", "length": "0.3",
     }  # fmt: skip

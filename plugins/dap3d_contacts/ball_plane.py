@@ -1,5 +1,8 @@
 """A ball, or a point, at a plane."""
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 from dap3d_core.interface import Contact, Point, Vector, hookimpl, number, point, vector
 from dap3d_core.kernels import dot, scale, sub
 
@@ -15,6 +18,7 @@ class BallPlane(Contact):
     """
 
     keyword = "ball_plane"
+    surfaces: ClassVar[Mapping[str, str]] = {"i": "sphere"}
     P_i: Point = point(doc="centre of the ball")
     radius: float = number(0.0, unit="m", minimum=0.0, doc="of the ball; 0: a point")
     P_j: Point = point("ground.O", doc="point of the plane")

@@ -1,6 +1,8 @@
 """A ball, or a point, at a surface z = f(x, y)."""
 
 import math
+from collections.abc import Mapping
+from typing import ClassVar
 
 from dap3d_core.interface import REQUIRED, Contact, Point, choice, function, hookimpl, number, point
 from dap3d_core.kernels import add, root, rotate, scale, sqrt, sub, transpose, where
@@ -54,6 +56,7 @@ class BallSurface(Contact):
     """
 
     keyword = "ball_surface"
+    surfaces: ClassVar[Mapping[str, str]] = {"i": "sphere"}
     P_i: Point = point(doc="centre of the ball")
     radius: float = number(0.0, unit="m", minimum=0.0, doc="of the ball; 0: a point")
     P_j: Point = point("ground.O", doc="where x, y and z are zero")

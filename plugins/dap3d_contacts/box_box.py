@@ -140,6 +140,7 @@ class BoxBox(Contact):
     """
 
     keyword, points = "box_box", 2 * CORNERS + EDGES
+    surfaces: ClassVar[Mapping[str, str]] = {"i": "box", "j": "box"}
     example: ClassVar[Mapping[str, str]] = {
         "P_j": '"rod.O"', "size_i": "[0.1, 0.1, 0.1]", "size_j": "[0.2, 0.3, 0.4]",
     }  # fmt: skip

@@ -1,5 +1,8 @@
 """The eight corners of a box at a plane."""
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 from dap3d_core.interface import Body, Contact, Point, Vector, body, hookimpl, point, vec3, vector
 from dap3d_core.kernels import add, dot, sub
 
@@ -16,6 +19,7 @@ class BoxPlane(Contact):
     """
 
     keyword, points = "box_plane", 8
+    surfaces: ClassVar[Mapping[str, str]] = {"i": "box"}
     body_axes = ("i",)
     body_i: Body = body(default=None, doc="body that carries the box")
     P_i: Point = point(default=None, doc="centre of the box; the mass centre when left out")

@@ -24,6 +24,7 @@ class CapsulePlane(Contact):
     """
 
     keyword, points = "capsule_plane", 2
+    surfaces: ClassVar[Mapping[str, str]] = {"i": "capsule"}
     example: ClassVar[Mapping[str, str]] = {"radius": "0.0"}
     P_i: Point = point(doc="centre of one end")
     Q_i: Point = point(doc="centre of the other")

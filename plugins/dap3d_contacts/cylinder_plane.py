@@ -68,6 +68,7 @@ class DiskPlane(Contact):
     """
 
     keyword, points, rims = "disk_plane", 1 + FLAT, (1.0,)
+    surfaces: ClassVar[Mapping[str, str]] = {"i": "disk"}
     body_axes = ("i",)  # the points of a cap
     example: ClassVar[Mapping[str, str]] = {
         "P_j": '"ground.O"', "a_j": '"ground.z"', "radius": "0.1",
@@ -121,6 +122,7 @@ class CylinderPlane(DiskPlane):
     """
 
     keyword, points, rims = "cylinder_plane", 2 + FLAT, (-1.0, 1.0)
+    surfaces: ClassVar[Mapping[str, str]] = {"i": "cylinder"}
     body_axes = ("i",)  # the points of a cap
     example: ClassVar[Mapping[str, str]] = {**DiskPlane.example, "length": "0.2"}
     length: float = number(unit="m", positive=True, doc="of the cylinder, from cap to cap")

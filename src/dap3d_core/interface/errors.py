@@ -14,6 +14,8 @@ from dap3d_core.interface.fields import specs_of
 
 #: The maker of a field by its annotation; of numbers by default.
 MAKERS = {"Point": "point", "Vector": "vector", "Vector2": "vector2", "Body": "body"}
+#: What a scene names a type by, after the distribution and a colon where two have one of its name.
+KEYWORD = re.compile(r"\w(?:[\w.-]*\w)?")
 #: Of the dynamic linker, and of threads.
 MEMORY_WORDS = ("failed to map segment", "cannot allocate memory", "can't start new thread")
 
@@ -64,6 +66,17 @@ def line_of(error: BaseException, kernel: Callable[..., Any]) -> str:
     file = unwrap(kernel).__code__.co_filename
     lines = [f.lineno for f in extract_tb(error.__traceback__) if f.filename == file]
     return f" [{file}:{lines[-1]}]" if lines else ""
+
+
+def fault_of_keyword(type_: Any) -> str:
+    """The reason why a type cannot be named by its keyword; "" where it can."""
+    keyword = type_.keyword
+    if not isinstance(keyword, str) or not keyword:
+        example = f'keyword = "{type_.__name__.lower()}"'
+        return f"has no keyword; add e.g. {example}, without an annotation"
+    if KEYWORD.fullmatch(keyword):
+        return ""
+    return f"has keyword = {keyword!r}, which is no word; use letters, digits, and - _ . in it"
 
 
 def no_field(type_: type, name: str) -> str:

@@ -158,8 +158,23 @@ def _write(model: Exported, platforms: Sequence[Platform], target: Path, fmi: in
         # libraries of what was there before would be loaded for the new ones
         for name in PLATFORMS:
             shutil.rmtree(target / name, ignore_errors=True)
-        shutil.copytree(made, target, dirs_exist_ok=True)
+        _copy(made, target)
         return size
+
+
+def _copy(made: Path, target: Path) -> None:
+    """Copy a folder; one that is not written whole is removed, if it was not there before."""
+    was_there = target.exists()
+    try:
+        for file in made.rglob("*"):
+            copy = target / file.relative_to(made)
+            if file.is_file():
+                copy.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy(file, copy)
+    except OSError:
+        if not was_there:
+            shutil.rmtree(target, ignore_errors=True)
+        raise
 
 
 def _parameters(

@@ -15,7 +15,7 @@ import pluggy
 
 from dap3d_core.interface import PluginError, hooks
 from dap3d_core.interface.codegen.type_info import TypeInfo
-from dap3d_core.interface.errors import where_is
+from dap3d_core.interface.errors import fault_of_keyword, where_is
 from dap3d_core.interface.examine.examine import examine
 from dap3d_core.interface.hooks import GROUPS, KINDS, PROJECT
 from dap3d_core.interface.types import INTERFACE_VERSION, TypeBase
@@ -138,10 +138,8 @@ def _call_hook(brought: pluggy.HookRelay, kind: str, *, must_exist: bool) -> lis
                     f"{hook}() should return subclasses of {base.__name__}; "
                     f"it returned {type_!r} among them"
                 )
-            if not isinstance(type_.keyword, str) or not type_.keyword:
-                raise PluginError(
-                    f'{where_is(type_)} has no keyword; add keyword = "..." without an annotation'
-                )
+            if fault := fault_of_keyword(type_):
+                raise PluginError(f"{where_is(type_)} {fault}")
             types.append(type_)
     return types
 

@@ -25,6 +25,8 @@ _OTHER_NAMES = {
     "gravity": "g gravitational_acceleration",
     "body": "parent link",
     "sPp": "offset coordinates",
+    "teeth_i": "z_i N_i",
+    "teeth_j": "z_j N_j",
     "name": "title",
     "type": "kind class",
     "scene": "title model header",
@@ -68,7 +70,7 @@ def nearest(word: Any, allowed: Collection[str]) -> str:
         if name in words.word_of:
             return words.word_of[name]
     forms = _alike(wanted, words) if len(words.word_of) > MANY_WORDS else list(words.word_of)
-    near = get_close_matches(wanted, forms, 1)
+    near = [form for form in get_close_matches(wanted, forms) if _begin_alike(form, wanted)]
     near = near or sorted((f for f in forms if _abbreviates(f, wanted)), key=len)[-1:]
     return words.word_of[near[0]] if near else ""
 
@@ -108,6 +110,13 @@ def _alike(wanted: str, words: _Words) -> list[str]:
 def _neighbours(wanted: str, ordered: list[str]) -> list[str]:
     at = bisect_left(ordered, wanted)
     return ordered[max(0, at - NEIGHBOURS) : at + NEIGHBOURS]
+
+
+def _begin_alike(form: str, wanted: str) -> bool:
+    """False of words that share no more than the letter of a body, such as ``z_i`` and ``P_i``."""
+    if form[0] == wanted[0] or form[-2:] != wanted[-2:] or form[-2:-1] != "_":
+        return True
+    return bool(get_close_matches(wanted[:-2], [form[:-2]]))
 
 
 def _abbreviates(form: str, wanted: str) -> bool:

@@ -1,5 +1,6 @@
 """Mistakes in a scene, and the error that reports all of them at once."""
 
+import math
 from collections.abc import Callable, Collection, Iterable
 from typing import Any, Final
 
@@ -146,8 +147,9 @@ def shown(value: Any, width: int = 60) -> str:
         text = f"[{', '.join(items)}{', ...' if len(value) > len(items) else ''}]"
     elif isinstance(value, int) and value.bit_length() > 4 * width:
         # Python refuses to write out thousands of digits; a hexadecimal number may have them.
-        first = abs(value) >> (value.bit_length() - 32)
-        text = f"{'-' if value < 0 else ''}{first:#x} ... of {value.bit_length()} bits"
+        cut = value.bit_length() - 64
+        size, power = math.modf(math.log10(abs(value) >> cut) + cut * math.log10(2.0))
+        text = f"{'-' if value < 0 else ''}{10.0**size:.3g}e+{power:.0f}"
     elif isinstance(value, str):
         text = '"' + repr(value[:width])[1:-1] + '"'
     else:

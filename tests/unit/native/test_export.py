@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 from functools import partial
+from pathlib import Path
 
 import attrs
 import numpy as np
@@ -13,6 +14,7 @@ from verification.test_rolling_resistance import Wheel, scene_on_wheel
 
 import dap3d_core as dap
 from dap3d_core.integrators.moreau import arrays
+from dap3d_core.native import export
 from dap3d_core.native.build import own_platform
 
 SPRING = """
@@ -504,3 +506,22 @@ def test_a_run_whose_contacts_come_to_no_end_says_why(tmp_path, monkeypatch, lim
     made = dap.export_model("cradle", tmp_path / "c", format="c", t_end=5.0)
     with pytest.raises(dap.SimulationError, match=said):
         dap.load_native(made.path).start(5.0).step_to(5.0)
+
+
+def test_a_folder_that_the_disk_has_no_room_for_is_not_left(tmp_path, monkeypatch):
+    made, out = tmp_path / "made", tmp_path / "out"
+    (made / "linux").mkdir(parents=True)
+    for name in ("a.h", "linux/lib.so"):
+        (made / name).write_text("text")
+
+    def full(source, target):
+        Path(target).touch()
+        raise OSError(28, "No space left on device", str(target))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(shutil, "copy", full)
+        with pytest.raises(OSError, match="No space left on device"):
+            export._copy(made, out)
+    assert not out.exists()
+    export._copy(made, out)
+    assert (out / "linux" / "lib.so").read_text() == "text"

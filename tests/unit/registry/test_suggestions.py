@@ -25,6 +25,10 @@ MANY = [f"left_rear_suspension_{k:05d}" for k in range(50_000)]
         ("title", ["name", "schema"], "name"),
         ("velocity", ["velocity_x", "r_dot"], "r_dot"),
         ("inertia", ["mass"], ""),
+        ("z_i", ["P_i", "a_i", "teeth_i"], "teeth_i"),
+        ("q_i", ["P_i", "a_i", "teeth_i"], ""),  # no more alike than the letter of a body
+        ("axis_i", ["P_i", "a_i", "a_j"], "a_i"),
+        ("a_k", ["P_i", "a_i"], "a_i"),
         ("ROD", ["Rod", "rod"], "Rod"),  # two of other case: the first
         ("a" * (LONGEST + 1), ["a" * LONGEST], ""),  # nothing is similar to a very long word
     ],

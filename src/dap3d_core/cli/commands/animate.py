@@ -51,7 +51,6 @@ def animate(
     from dap3d_core.cli.console.progress import counting
     from dap3d_core.cli.framework.paths import open_result, output_path, writable
     from dap3d_core.plot import animate as draw
-    from dap3d_core.result import ResultError
 
     opened = open_result(result)
     target = output_path(result, output, ".gif" if len(opened.t) > 1 else ".png")
@@ -59,7 +58,7 @@ def animate(
     if size is not None:
         options["size"] = _size(size)
     writable(target, force=force, sources=(Path(result),))
-    with counting("frame") as progress, refusing(ValueError, ResultError):
+    with counting("frame") as progress, refusing(ValueError):
         film = draw(opened, target, progress=progress, fit=fit, force=force, **options)
     width, height = film.size
     contents = f"{width} x {height}, {count(film.frames, 'frame')}"

@@ -117,7 +117,6 @@ def _export_result(
     from dap3d_core.cli.console.progress import counting
     from dap3d_core.cli.framework.paths import open_result, output_path, refuse_all, writable
     from dap3d_core.exchange import check_fps, exporter_of, suffix_of
-    from dap3d_core.result import ResultError
 
     suffix = suffix_of(kind or "vtk")
     target = output_path(result, output, suffix)
@@ -134,7 +133,7 @@ def _export_result(
             any_name=True,
         ),
     )
-    with counting("part") as progress, refusing(ValueError, ResultError):
+    with counting("part") as progress, refusing(ValueError):
         made = write(opened, target, format=kind, fps=fps, model=model, progress=progress,
                      force=force)  # fmt: skip
     data = {"format": made.format, "instants": made.instants}
@@ -149,6 +148,7 @@ def _export_model(model: str, kind: str, output: str | None, *, strict: bool, fo
     from dap3d_core.cli.framework.paths import writable
     from dap3d_core.registry.extensions import extensions
     from dap3d_core.registry.suggestions import did_you_mean
+    from dap3d_core.result.file.atomic_write import cannot
 
     formats = extensions("exporter")
     if kind not in formats.keywords:
@@ -161,7 +161,7 @@ def _export_model(model: str, kind: str, output: str | None, *, strict: bool, fo
     try:
         report = dap.export_model(scene, target, format=kind, strict=strict, force=True)
     except OSError as error:
-        raise Refused(f"cannot write {target}: {error.strerror or error}") from error
+        raise cannot("write", target, error) from error
     remarks = {
         key: [one.text for one in getattr(report, key)] for key in ("translated", "left_out")
     }
@@ -196,6 +196,7 @@ def _export_native(
     import dap3d_core as dap
     from dap3d_core.cli.console.console import count, print_json, stdout
     from dap3d_core.cli.framework.paths import writable
+    from dap3d_core.result.file.atomic_write import cannot
 
     kind = kind or "fmu"
     target = Path(output or _name_of(model) + (".fmu" if kind == "fmu" else ""))
@@ -212,7 +213,7 @@ def _export_native(
     except FileExistsError as error:
         raise Refused(f"{target} exists; --force overwrites it") from error
     except OSError as error:
-        raise Refused(f"cannot write {target}: {error.strerror or error}") from error
+        raise cannot("write", target, error) from error
     data = {
         "file": str(target), "format": kind, "platforms": made.platforms, "inputs": made.inputs,
         "parameters": made.parameters, "outputs": made.outputs, "left_out": made.left_out,

@@ -13,6 +13,17 @@ from dap3d_core.interface.types import Joint, TypeBase
 DECLARED = ("gap", "normal")
 #: What they may define besides.
 OPTIONAL = ("at", "reach", "along", "grip", "grain", "resist")
+#: Kinds of surfaces in pictures -> the fields, with the letter of the body or without it, and
+#: numbers of ``prepare``, that each is drawn from (view/scene3d/contact_shapes.py).
+SURFACES: Mapping[str, tuple[str, ...]] = {
+    "sphere": ("P", "radius"),
+    "shell": ("P", "radius"),
+    "box": ("P", "size"),
+    "disk": ("P", "a", "radius"),
+    "cylinder": ("P", "a", "radius", "length"),
+    "capsule": ("P", "Q", "radius"),
+    "curve": ("P", "samples", "is_closed"),
+}
 #: Fields that a material gives.
 MATERIAL = ("mu", "mu_s", "mu_roll", "mu_spin", "e", "law")
 #: Values of ``law``.
@@ -76,6 +87,7 @@ class Contact(Joint):
     bodies, are derived.
 
     Attributes:
+        surfaces: body slot -> what it touches with in pictures, one of SURFACES.
         points: at how many points the bodies may touch. Each is a contact of its own, whose
             ``part``, 0 and so on, ``prepare`` reads: it returns what differs between them.
         is_smooth: without friction, and without fields of a material but ``e``.
@@ -93,6 +105,7 @@ class Contact(Joint):
     holonomic: ClassVar[bool | tuple[bool, ...]] = (True, False, False)
     is_contact: ClassVar[bool] = True
     declared: ClassVar[tuple[str, ...]] = (*DECLARED, *OPTIONAL)
+    surfaces: ClassVar[Mapping[str, str]] = {}
     points: ClassVar[int] = 1
     is_smooth: ClassVar[bool] = False
     shared: ClassVar[tuple[str, ...]] = ()

@@ -42,7 +42,15 @@ from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.contacts.contact import DECLARED
 from dap3d_core.interface.derive.derive import CannotDeriveError, derive, missing
 from dap3d_core.interface.element_states import unknown_names
-from dap3d_core.interface.errors import PluginError, line_of, name_hint, no_field, where_is
+from dap3d_core.interface.errors import (
+    PluginError,
+    fault_of_keyword,
+    line_of,
+    name_hint,
+    no_field,
+    where_is,
+)
+from dap3d_core.interface.examine.check_pictures import check_pictures
 from dap3d_core.interface.examine.random_values import (
     numbers,
     random_field,
@@ -50,7 +58,7 @@ from dap3d_core.interface.examine.random_values import (
     random_quantity,
 )
 from dap3d_core.interface.fields import SLOTS, sized_fields, slot_of, specs_of
-from dap3d_core.interface.types import SYMBOLS, BodyPose, Force, Function, Joint, TypeBase
+from dap3d_core.interface.types import BodyPose, Force, Function, Joint, TypeBase
 
 #: Random inputs a type may refuse, or be undefined for, before it counts as broken.
 ATTEMPTS = 200
@@ -74,7 +82,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     has_states = _declares_states(type_, is_abstract=bool(variants))
     rng = random.Random(seed)
     layout = layout_of(type_, _random_constants(type_, rng))
-    _check_symbol(type_, layout)
+    check_pictures(type_, layout)
     _check_named_fields(type_, layout)
     if "reset" in type_.kernels() and not layout.states:
         what = 'defines reset, but no states; add e.g. states = ("z",) and rate'
@@ -225,21 +233,6 @@ def prepared(instance: Any, bodies: Mapping[str, BodyPose]) -> dict[str, Any]:
     return {name: _constant(name, value, broken) for name, value in constants.items()}
 
 
-def _check_symbol(type_: type[TypeBase], layout: InstanceLayout) -> None:
-    if not type_.symbol:
-        return
-    who, symbol = where_is(type_), f"symbol = {type_.symbol!r}"
-    if type_.symbol not in SYMBOLS:
-        raise PluginError(f"{who}: {symbol} is not one of {', '.join(SYMBOLS)}")
-    stored = {name: s.kind for name, s in specs_of(type_).items() if name in layout.numbers}
-    offered = {*layout.slots, *stored, *stored.values()}
-    if lacking := [name for name in SYMBOLS[type_.symbol] if name not in offered]:
-        raise PluginError(
-            f"{who}: {symbol} is drawn from {', '.join(lacking)}, which the type does not have; "
-            'name another symbol, or leave "" to draw what it declares'
-        )
-
-
 def _check_named_fields(type_: type[TypeBase], layout: InstanceLayout) -> None:
     for word, shapes, what in (
         ("actuates", ((), (3,)), "of a number or of three; name the one that an actuator sets"),
@@ -315,9 +308,8 @@ def _check_conditions(type_: type[TypeBase], conditions: Mapping[str, Any], vari
 
 def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
     who, kind = where_is(type_), type_.kind
-    if not type_.keyword:
-        example = f'keyword = "{type_.__name__.lower()}"'
-        raise PluginError(f"{who} has no keyword; add e.g. {example}, without an annotation")
+    if fault := fault_of_keyword(type_):
+        raise PluginError(f"{who} {fault}")
     for field in attrs.fields(type_):  # type: ignore[arg-type]
         if "dap3d" not in field.metadata and field.default is attrs.NOTHING:
             raise PluginError(f"{who}: {no_field(type_, field.name)}")

@@ -14,9 +14,11 @@ from dap3d_core.model.rotations import euler_rates, to_global
 from dap3d_core.model.state_layout import split
 from dap3d_core.plot.film.projection import Camera
 from dap3d_core.plot.style import MARKERS, PALETTE
-from dap3d_core.result import Result
+from dap3d_core.result import Result, ResultError
 from dap3d_core.result.post.smooth_parts import cubic
 from dap3d_core.scene import Scene
+from dap3d_core.scene.validate.shapes import Shape
+from dap3d_core.view.scene3d.contact_shapes import contact_shapes
 from dap3d_core.view.scene3d.scene_data import scene_of
 from dap3d_core.view.scene3d.shapes import GROUND_COLOR, parts_of, scene_shapes
 
@@ -139,8 +141,10 @@ def sticks_of(
     pairs_of_bodies = [(body[a], body[b]) for a, b in links if body[a] and body[b]]
     colors = _colors(scene, summary.body_names, pairs_of_bodies)
     shapes = None
-    if scene.shapes:
-        shapes = shapes_of(scene, summary.body_names, [*map(to_hex, colors)], still=still)
+    surfaces = _surfaces(result) if scene.contacts else []
+    if scene.shapes or surfaces:
+        names = summary.body_names
+        shapes = shapes_of(scene, names, [*map(to_hex, colors)], surfaces, still=still)
         colors = tuple(shapes.hues.get(k, color) for k, color in enumerate(colors, 1))
     found, shaped = np.array(body), [] if shapes is None else [*shapes.hues]
     bare = np.isin(found, shaped, invert=True)
@@ -162,6 +166,14 @@ def sticks_of(
         shapes=shapes,
         limits=_limits(scene.animation.limits),
     )
+
+
+def _surfaces(result: Result) -> list[Shape]:
+    """What contacts touch with; nothing where the types of the scene are not at hand."""
+    try:
+        return contact_shapes(result.model)
+    except ResultError:
+        return []
 
 
 def _limits(given: Any) -> Floats | None:
@@ -295,14 +307,15 @@ class Shapes:
 
 
 def shapes_of(
-    scene: Scene, names: Sequence[str], colors: Sequence[str], *, still: bool = False
-) -> Shapes:
+    scene: Scene, names: Sequence[str], colors: Sequence[str], surfaces: Sequence[Shape] = (),
+    *, still: bool = False,
+) -> Shapes:  # fmt: skip
     """The shapes of a scene; arguments as of ``view.scene3d.shapes.scene_shapes``.
 
     Of too many triangles nothing is drawn, with a note; ``still``, for one picture, allows more.
     """
     most = MOST_IN_SNAPSHOTS if still else MOST_TRIANGLES
-    shapes = scene_shapes(scene, names, colors)
+    shapes = scene_shapes(scene, names, colors, surfaces)
     notes = list(shapes.notes)
     parts = [(part, part.vertices) for part in parts_of(shapes.marks, shapes.meshes)]
     size = max((float(np.max(np.ptp(local, axis=0))) for _, local in parts), default=0.0)
@@ -321,7 +334,9 @@ def shapes_of(
             "dap3d export show them" + (", and snapshots" if most < MOST_IN_SNAPSHOTS else "")
         )
         pieces = []
-    hues = {piece[0]: to_hex(_rgb(piece[3])) for piece in reversed(pieces)}
+    hues = {
+        piece[0]: to_hex(_rgb(piece[3])) for piece in reversed(pieces) if piece[0] in shapes.bodies
+    }
     none = np.zeros((0, 3))
     bodies, locals_, triangles, colors = zip((0, none, none, GROUND_COLOR), *pieces, strict=True)
     counts = [len(local) for local in locals_]

@@ -221,9 +221,11 @@ def whole_file(path: str | os.PathLike[str], force: bool = False) -> Iterator[Pa
     try:
         try:
             yield part
-        except OSError as error:
-            if isinstance(error, ResultError):
+        except ResultError as error:  # of a writer that knows only the temporary name
+            if str(part) not in str(error):
                 raise
+            raise ResultError(str(error).replace(str(part), str(target))) from error
+        except OSError as error:
             raise cannot("write", target, error) from error
         check_target(path, force)
         put_in_place(part, target, force)

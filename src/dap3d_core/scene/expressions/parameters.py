@@ -6,7 +6,6 @@ from typing import Any, TypeVar
 
 import attrs
 
-from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene.errors import Key
 from dap3d_core.scene.expressions.expression import (
     Expression,
@@ -31,22 +30,27 @@ def resolve(scene: Tables) -> Tables:
     Raises:
         SceneError: all mistakes in parameters and expressions, located.
     """
-    report = Collector(scene)
-    values = values_of(report)
-    report.raise_mistakes()
     result = scene.copy()
-    result.parameters = dict(values)
-    for table in NAMED:
-        for name, part in getattr(result, table).items():
-            _resolve_part(report, (table, name), part, values)
-    for k, point in enumerate(result.animation.points):
-        point.sPp = _resolve(report, ("animation", "points", k, "sPp"), point.sPp, values)
-    result.animation = attrs.evolve(
-        result.animation,
-        limits=_resolve(report, ("animation", "limits"), result.animation.limits, values),
-    )
+    report = Collector(result)
+    put_numbers(report)
     report.raise_mistakes()
     return result
+
+
+def put_numbers(report: Collector) -> None:
+    """Put numbers in place of expressions in the collector's scene.
+
+    An expression without a number remains, and later mistakes at its key are muted.
+    """
+    scene, values = report.scene, values_of(report)
+    for table in NAMED:
+        for name, part in getattr(scene, table).items():
+            _resolve_part(report, (table, name), part, values)
+    for k, point in enumerate(scene.animation.points):
+        point.sPp = _resolve(report, ("animation", "points", k, "sPp"), point.sPp, values)
+    limits = _resolve(report, ("animation", "limits"), scene.animation.limits, values)
+    scene.animation = attrs.evolve(scene.animation, limits=limits)
+    scene.parameters = dict(values)
 
 
 def _resolve_part(report: Collector, key: Key, part: Any, values: Mapping[str, float]) -> None:
@@ -70,48 +74,55 @@ def _resolve(report: Collector, key: Key, value: Any, values: Mapping[str, float
         return tuple(_resolve(report, (*key, k), one, values) for k, one in enumerate(value))
     if type(value) is not str or not value.startswith(MARK):
         return value
-    expression = report.read(key, value, _read)
-    return value if isinstance(expression, Fault) else _value(report, key, expression, values)
+    expression = _expression(report, key, value)
+    number = None if expression is None else _value(report, key, expression, values)
+    if number is None:
+        report.muted.add(key)
+    return value if number is None else number
 
 
-def _read(value: str) -> Any:
-    """The expression behind the mark, or its fault."""
-    return read_expression(value.removeprefix(MARK))
+def _expression(report: Collector, key: Key, value: str) -> Expression | None:
+    """The expression behind the mark, of parameters of the scene; None where it is a mistake."""
+    expression = report.read(key, value, lambda text: read_expression(text.removeprefix(MARK)))
+    if isinstance(expression, Fault):
+        return None
+    declared = report.scene.parameters
+    unknown = next((name for name in expression.names if name not in declared), None)
+    if unknown is not None:
+        what = f"there is no parameter {unknown!r}; parameters: {', '.join(declared) or 'none'}"
+        report.add(key, value, what, report.nearest(unknown, declared))
+        return None
+    return expression
 
 
 def _value(
     report: Collector, key: Key, expression: Expression, values: Mapping[str, float]
-) -> float:
-    """The number that an expression gives; a mistake and 0 where it has none."""
-    text = f"{MARK}{expression.text}"
-    unknown = next((name for name in expression.names if name not in values), None)
-    if unknown is not None:
-        listed = ", ".join(values) or "none"
-        what = f"there is no parameter {unknown!r}; parameters: {listed}"
-        report.add(key, text, what, nearest(unknown, values))
-        return 0.0
+) -> float | None:
+    """The number that an expression gives; None after a mistake in it or its parameters."""
+    if not values.keys() >= set(expression.names):
+        return None
     try:
         number = number_of(float(expression.evaluate(values)))
     except ExpressionError as error:
         number = error.fault
     if isinstance(number, Fault):
         given = ", ".join(f"{name} = {values[name]:g}" for name in expression.names)
-        report.add(key, text, f"has no finite value{f' for {given}' if given else ''}")
-        return 0.0
+        what = f"has no finite value{f' for {given}' if given else ''}"
+        report.add(key, f"{MARK}{expression.text}", what)
+        return None
     return number
 
 
 def values_of(report: Collector) -> dict[str, float]:
-    """The values of the parameters, in the order of the scene."""
+    """The values of the parameters without mistakes, in the order of the scene."""
     values: dict[str, float] = {}
     expressions: dict[str, Expression] = {}
     for name, given in report.scene.parameters.items():
         key = ("parameters", str(name))
         if fault := fault_of_name(name) or fault_of_word(name):
             report.add(key, name, f"not a name for a parameter: {fault}")
-        if isinstance(given, str) and given.startswith(MARK):
-            expression = report.read(key, given, _read)
-            if not isinstance(expression, Fault):
+        elif isinstance(given, str) and given.startswith(MARK):
+            if (expression := _expression(report, key, given)) is not None:
                 expressions[name] = expression
         else:
             number = report.read(key, given, number_of)
@@ -124,9 +135,9 @@ def values_of(report: Collector) -> dict[str, float]:
         cycle = error.args[1][::-1]
         what = f"parameters name one another in a circle: {' -> '.join(cycle)}"
         report.add(("parameters", cycle[0]), report.scene.parameters[cycle[0]], what)
-        return {}
-    if report.mistakes:
-        return {}
+        order = []
     for name in order:
-        values[name] = _value(report, ("parameters", name), expressions[name], values)
-    return {name: values[name] for name in report.scene.parameters}
+        number = _value(report, ("parameters", name), expressions[name], values)
+        if number is not None:
+            values[name] = number
+    return {name: values[name] for name in report.scene.parameters if name in values}

@@ -45,6 +45,10 @@ _LONG_KEY = re.compile(
     rf"{{{MOST_PARTS}}}",
     re.MULTILINE,
 )
+#: Python reads no longer whole numbers.
+_LONG_NUMBER = re.compile(r"[0-9][0-9_]{4300}")
+#: How ``tomllib`` begins to say that a key or a table is there twice.
+_TWICE = ("Cannot declare", "Cannot overwrite")
 #: Maximal nesting of tables and lists; a scene needs five levels.
 DEEPEST = 50
 
@@ -303,18 +307,34 @@ def _parse(text: str, path: Path) -> dict[str, Any]:
         return data
     place = re.search(r"\(at line (\d+), column (\d+)\)", words)
     what = re.sub(r"\s*\(at [^()]*\)$", "", words)
-    if place is None:
-        line = text.count("\n") + 1 if "end of document" in words else None
-        what = f"not valid TOML: {what}" + (" at the end of the file" if line else "")
-    else:
+    line: int | None
+    if place is not None:
         line = int(place[1])
-        what = f"not valid TOML: {what} at line {line}, column {place[2]}"
+        what = f"{what} at line {line}, column {place[2]}"
+        if what.startswith(_TWICE):
+            what = _twice(canonical(text), line) or what
+    elif long := _LONG_NUMBER.search(text):
+        line = text.count("\n", 0, long.end()) + 1
+        what = "a number of thousands of digits"
+    else:
+        line = text.count("\n") + 1 if "end of document" in words else None
+        what += " at the end of the file" if line else ""
+    what = f"not valid TOML: {what}"
     remedy = "" if line is None else _remedy(text.splitlines()[line - 1 : line])
     if path.suffix == ".m":
         remedy = "this is a MATLAB file; dap3d import-matlab FOLDER makes a scene of it"
     elif path.suffix in (".urdf", ".sdf", ".xml", ".xacro"):
         remedy = f"this is a model of another program; dap3d import {path.name} makes a scene of it"
     raise file_error(path, what, line=line, remedy=remedy)
+
+
+def _twice(text: str, line: int) -> str:
+    """Where a key that a line gives again was given first; "" where that is not found."""
+    from dap3d_core.scene.validate.mistake_collector import lines_of
+
+    again = max(lines_of(text.splitlines()[line - 1]), key=len, default=())
+    before = [n for key, n in lines_of(text).items() if key[-len(again) :] == again and n < line]
+    return f"{dotted(again)} is there twice, first in line {max(before)}" if before else ""
 
 
 #: Invalid values that users of other languages write, and the remedy.

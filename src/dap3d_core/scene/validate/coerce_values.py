@@ -65,7 +65,8 @@ def _number_fault(value: Any) -> float | Fault:
             return float(value)
         return Fault(f"{should} of at most {LARGEST:g} in size: products of larger ones overflow")
     if type(value) is float:
-        return Fault(f"should be a finite number, not {value}")
+        remedy = "numbers beyond 1.8e+308 are read as inf" if math.isinf(value) else ""
+        return Fault(f"should be a finite number, not {value}", remedy)
     if type(value) is tuple:
         return Fault(f"{should}, not a list of {len(value)}")
     return Fault(f"{should}, not {_kind(value)}")

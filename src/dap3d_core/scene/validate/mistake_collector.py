@@ -33,12 +33,23 @@ _PLAIN_VALUE = re.compile(r"[^,\]}#\n]*")
 
 
 class Collector(MistakeList):
-    """Mistakes and notes of a scene."""
+    """Mistakes and notes of a scene.
+
+    Attributes:
+        scene: the scene.
+        muted: keys of values that other mistakes have left without meaning.
+    """
 
     def __init__(self, scene: SceneTables) -> None:
         super().__init__(scene.faults)
         self.scene = scene
+        self.muted: set[Key] = set()
         self._notes: dict[str, list[str]] = {}
+
+    def add(self, key: Key, value: Any, what: str, nearest: str = "", remedy: str = "") -> None:
+        """Append a mistake, unless its key, one above or one below it is muted."""
+        if not any(key[: len(other)] == other[: len(key)] for other in self.muted):
+            super().add(key, value, what, nearest, remedy)
 
     def read(self, key: Key, value: Any, reader: Callable[[Any], Any], doc: str = "") -> Any:
         """The value of a field as its reader returns it; a ``Fault`` is reported under its key.

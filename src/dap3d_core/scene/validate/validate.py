@@ -41,8 +41,8 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     from dap3d_core.scene.validate.settings import check_header, check_settings, notes_of
     from dap3d_core.scene.validate.types import Types
 
-    scene = scene.resolved()
-    report = Collector(scene)
+    scene = scene.copy() if scene.parameters else scene
+    report = _collector(scene)
     _check_names(report)
     bodies = read_bodies(report)
     geometry = read_geometry(report, bodies)
@@ -81,6 +81,16 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
         inputs=inputs,
         notes=notes,
     )
+
+
+def _collector(scene: Scene) -> Collector:
+    """The collector of a scene, in which numbers are put in place of expressions of parameters."""
+    report = Collector(scene)
+    if scene.parameters:
+        from dap3d_core.scene.expressions.parameters import put_numbers
+
+        put_numbers(report)
+    return report
 
 
 def _check_names(report: Collector) -> None:

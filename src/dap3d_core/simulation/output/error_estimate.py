@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
-from dap3d_core.result import Computed, Note, Result, estimated_error, information
+from dap3d_core.result import Computed, Note, Result, ResultError, estimated_error, information
 from dap3d_core.result.post.global_error import MEANINGLESS
 from dap3d_core.scene import SceneError, Simulation
 from dap3d_core.settings import SMALLEST_RTOL
@@ -181,5 +181,12 @@ def _divergence_note(result: Result) -> list[str]:
 def _amend(result: Result, output: str | os.PathLike[str] | None, *notes: str) -> None:
     """Add notes, and bring the file up to date."""
     result.record = attrs.evolve(result.record, notes=(*result.notes, *notes))
-    if output is not None:
+    if output is None:
+        return
+    try:
         result.save(output, force=True)
+    except ResultError as error:
+        raise ResultError(
+            f"{error}; it holds the whole run, without the estimate of its error: free as much "
+            "room again, and run it anew"
+        ) from error

@@ -10,6 +10,8 @@ from dap3d_core.interface.types import acts_on_all
 from dap3d_core.model import Model
 from dap3d_core.model.groups import Group
 from dap3d_core.result import Result, ResultError
+from dap3d_core.scene.validate.shapes import Shape
+from dap3d_core.view.scene3d.contact_shapes import contact_shapes
 from dap3d_core.view.scene3d.primitives import Located, Point, floats_of
 
 ORIGIN = (0.0, 0.0, 0.0)
@@ -47,9 +49,14 @@ class ElementGeometry:
 
 @attrs.frozen
 class Elements:
-    """Joints and forces; none, and why, where the model cannot be made again."""
+    """Joints and forces; none, and why, where the model cannot be made again.
+
+    Contacts are drawn by ``surfaces``, what they touch with.
+    """
 
     joints: list[ElementGeometry]
+    contacts: list[ElementGeometry]
+    surfaces: list[Shape]
     forces: list[ElementGeometry]
     gravity: Point | None
     missing: str
@@ -60,13 +67,16 @@ def elements_of(result: Result) -> Elements:
     try:
         model = result.model
     except ResultError as error:
-        return Elements([], [], None, str(error))
-    return Elements(joints_of(model), forces_of(model), gravity_of(model), "")
+        return Elements([], [], [], [], None, str(error))
+    joints, forces = joints_of(model), forces_of(model)
+    contacts, surfaces = _in_order(model.contacts, model.joint_names), contact_shapes(model)
+    return Elements(joints, contacts, surfaces, forces, gravity_of(model), "")
 
 
 def joints_of(model: Model) -> list[ElementGeometry]:
-    """The joints of a model, in file order."""
-    return _in_order(model.joints, model.joint_names)
+    """The joints of a model, in file order, without contacts."""
+    groups = [g for g in model.joints if not g.type_info.type.is_contact]
+    return _in_order(groups, model.joint_names)
 
 
 def forces_of(model: Model) -> list[ElementGeometry]:

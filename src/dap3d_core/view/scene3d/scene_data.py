@@ -81,13 +81,13 @@ def scene_geometry(result: Result, scene: Scene, elements: Elements) -> SceneGeo
     """The solids of a result with its scene, whose folder, where known, holds its meshes."""
     summary, motion = result.summary, Motion(result)
     hues = colors([scene.bodies[n].color for n in summary.body_names], _pairs(elements.joints))
-    shapes = scene_shapes(scene, summary.body_names, hues)
-    every = [*elements.joints, *elements.forces]
+    shapes = scene_shapes(scene, summary.body_names, hues, elements.surfaces)
+    every = [*elements.joints, *elements.contacts, *elements.forces]
     points = attachment_points(summary, every)
     bodies = range(1, summary.body_count + 1)
     bounds = [(k, ORIGIN) for k in bodies] + shapes.corners
     bounds += [(k, at) for k, on_body in enumerate(points) for at in on_body]
-    bare = [k for k in bodies if not points[k] and k not in shapes.bodies]
+    bare = [k for k in bodies if not points[k] and k not in shapes.bodies | shapes.touching]
     low, high, _ = motion.extent(bounds)
     size = float(np.linalg.norm(high - low))
     unit = unit_of(points, size or 1.0)

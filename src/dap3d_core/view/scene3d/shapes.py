@@ -116,6 +116,7 @@ class SceneShapes:
         marks, lines, meshes: solids, lines and triangles.
         corners: points that bound the shapes, for the camera.
         bodies: indices of the bodies that have a shape.
+        touching: those without, drawn by what contacts touch with.
         notes: shapes that are not drawn, and why.
     """
 
@@ -124,15 +125,19 @@ class SceneShapes:
     meshes: list[Mesh] = attrs.Factory(list)
     corners: list[Located] = attrs.Factory(list)
     bodies: set[int] = attrs.Factory(set)
+    touching: set[int] = attrs.Factory(set)
     notes: list[str] = attrs.Factory(list)
 
 
-def scene_shapes(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> SceneShapes:
+def scene_shapes(
+    scene: Scene, names: Sequence[str], colors: Sequence[str], surfaces: Sequence[Shape] = ()
+) -> SceneShapes:
     """The shapes of a scene.
 
     Args:
         scene: a valid one; its folder, where known, holds its meshes.
         names, colors: of the bodies, without ground.
+        surfaces: those of contacts, drawn of bodies without shapes of their own.
     """
     index = {"ground": 0} | {name: k for k, name in enumerate(names, 1)}
     shapes = SceneShapes()
@@ -142,6 +147,11 @@ def scene_shapes(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> S
             fault = _add(shapes, shape, color(shape.values["color"], usual), scene.folder)
         if fault:
             shapes.notes.append(f"shape {shape.name} is not drawn: {fault}")
+    own = set(shapes.bodies)
+    for shape in surfaces:
+        if shape.body not in own:
+            _add(shapes, shape, colors[shape.body - 1] if shape.body else GROUND_COLOR, None)
+    shapes.bodies, shapes.touching = own, shapes.bodies - own
     return shapes
 
 

@@ -1,6 +1,7 @@
 """Contact types: what is derived from gap, point and normal, checked as check-plugin does."""
 
 import math
+import re
 
 import pytest
 
@@ -58,6 +59,23 @@ def test_a_velocity_in_a_gap_is_refused():
 
     with pytest.raises(PluginError, match=r"Fast\.gap asks for v_P_i, a quantity of the velocity"):
         examine(Fast)
+
+
+@pytest.mark.parametrize(
+    ("surfaces", "said"),
+    [
+        ({"i": "blob"}, "'blob'}: bodies are i, surfaces sphere, shell"),
+        ({"j": "sphere"}, "{'j': 'sphere'}: bodies are i,"),
+        ({"i": "sphere"}, "is drawn from radius, which the type does not have"),
+    ],
+)
+def test_surfaces_that_cannot_be_drawn_are_refused(surfaces, said):
+    class Drawn(Pipe):
+        keyword = "drawn"
+
+    Drawn.surfaces = surfaces
+    with pytest.raises(PluginError, match=re.escape(said)):
+        examine(Drawn)
 
 
 @pytest.mark.parametrize(

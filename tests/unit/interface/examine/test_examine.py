@@ -141,6 +141,8 @@ def prepare(constants):
         (type_of(Force), ["does not define wrench"]),
         (function(value=None), ["does not define value"]),
         (joint(keyword=""), ["has no keyword", 'keyword = "mine"']),
+        *((joint(keyword=word), [repr(word), "which is no word"])
+          for word in ("my rope", "-rope", "dist:rope", "rope\n")),
         (joint(rows=0), ["declares rows = 0", "one row or more"]),
         (joint(rows=-3), ["declares rows = -3"]),
         (joint(rows="3"), ["declares rows = '3'"]),

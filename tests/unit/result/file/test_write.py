@@ -221,23 +221,26 @@ def test_a_folder_without_permission(tmp_path):
 
 @pytest.mark.skipif(not hasattr(signal, "SIGXFSZ"), reason="no limits of file size here")
 def test_a_full_disk(tmp_path):
-    """The system refuses to write more than 50 kB to a file."""
+    """The system refuses to write more than 50 kB to a file: the message names that of the user."""
+    names = ["run.nc", "run.glb", "run.vtkhdf", "run.csv", "run.mat"]
     code = f"""
         import resource, signal, sys
         sys.path.insert(0, {TESTS!r})
+        import dap3d_core as dap
         from support.results import circling
         from dap3d_core.result import ResultError
-        result = circling(nt=1000)[0]
+        result = circling(nt=400)[0]
         sys.dont_write_bytecode = True  # it would be cut off, and kept
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, resource.RLIM_INFINITY))
-        try:
-            result.save("run.nc")
-        except ResultError as error:
-            print(error)
+        for name in {names}:
+            try:
+                result.save(name) if name == "run.nc" else dap.export(result, name)
+            except ResultError as error:
+                print(error)
     """
-    out = run(textwrap.dedent(code), cwd=tmp_path)
-    assert "cannot write run.nc" in out
+    said = run(textwrap.dedent(code), cwd=tmp_path).splitlines()
+    assert [line.partition(": ")[0] for line in said] == [f"cannot write {name}" for name in names]
     assert os.listdir(tmp_path) == []
 
 

@@ -108,7 +108,7 @@ def test_a_scene_keeps_its_expressions(tmp_path):
             ("L = '= half'", "in a circle: ", None),
             ("L = 'one'", "should be a number, not text", "L ="),
             ("L = '= 1 / 0'", "is not a finite number", "L ="),
-            ("L = 0.0\nx = '= 1 / L'", "has no finite value for L = 0", "x ="),
+            ("L = 1.0\nx = '= 1 / (L - 1)'", "has no finite value for L = 1", "x ="),
             ("L = 1.0\nx = '= Lenght'", "there is no parameter 'Lenght'", "x ="),
             ("L = 1.0\nx = '= 1 +'", "is no expression", "x ="),
             ("L = 1.0\nx = 1e200", "at most 1e+100", "x ="),
@@ -134,6 +134,29 @@ def test_a_wrong_parameter_or_expression_is_named_with_its_line(tmp_path, old, n
     assert mistake.key.startswith("parameters.") is (old == "L = 1.2")
     if at:
         assert text.splitlines()[mistake.line - 1].startswith(at)
+
+
+def test_wrong_expressions_and_unknown_keys_hide_no_other_mistake(tmp_path):
+    """Each is named once, and nothing that only follows from it: all of ROD stands on L."""
+    text = ROD
+    for old, new in {
+        "L = 1.2": "L = '= 1 / 0'",
+        'mass = "= mass"': "mass = -1.0\nmas = 1.0",
+        'sPp = [0.0, "=-half", 0.0]': 'sPp = [0.0, "= -hlaf", 0.0]',
+        'P_j = "ground.O"': 'P_j = "grund.O"',
+        'gravity = "= 9.81"': 'gravity = "= norm(1)"',
+        "t_end = 0.3": "t_end = -0.3",
+    }.items():
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "scene.toml"
+    path.write_text(text)
+    with pytest.raises(dap.SceneError) as refused:
+        dap.compile(path)
+    assert [mistake.key for mistake in refused.value.mistakes] == [
+        "parameters.L", "bodies.rod.mass", "bodies.rod.mas", "points.A.sPp.2",
+        "joints.hinge.P_j", "forces.gravity.gravity", "simulation.t_end",
+    ]  # fmt: skip
 
 
 def test_an_expression_without_parameters_says_what_it_needs():

@@ -196,7 +196,7 @@ def test_a_number_that_python_will_not_write_is_shown(scene_of, registry):
     huge = "0x" + "f" * 5000
     scene = scene_of(BASE.replace("mass = 1.0", f"mass = {huge}"))
     (mistake,) = mistakes_of(scene, registry)
-    assert str(mistake).startswith(f"{scene.path}:6: bodies.crank.mass = 0xffff")
+    assert str(mistake).startswith(f"{scene.path}:6: bodies.crank.mass = 3.98e+6020: ")  # 16^5000
     assert len(str(mistake).splitlines()[0]) < 300
     with pytest.raises(dap.SceneError, match="cannot hold so large a number"):
         scene.to_toml()

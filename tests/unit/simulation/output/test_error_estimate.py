@@ -4,6 +4,7 @@ import attrs
 import pytest
 
 import dap3d_core as dap
+from dap3d_core.result import ResultError
 
 MOTION = dict(t_end=0.2, dt=0.1)
 
@@ -64,3 +65,19 @@ def test_an_exception_of_a_callback_is_no_lack_of_time():
 
     with pytest.raises(ArithmeticError):
         quick(watch=stop)
+
+
+def test_a_disk_without_room_for_the_estimate_keeps_the_run(tmp_path, monkeypatch):
+    """The file is written anew with the estimate: the message says what the first one holds."""
+
+    save, saved = dap.Result.save, []
+
+    def save_once(self, path, force):
+        if saved:
+            raise ResultError(f"cannot write {path}: No space left on device")
+        saved.append(save(self, path, force=force))
+
+    monkeypatch.setattr(dap.Result, "save", save_once)
+    with pytest.raises(ResultError, match=r"No space left .*; it holds the whole run"):
+        quick(output=tmp_path / "run.nc")
+    assert dap.open(tmp_path / "run.nc").status == "done"
