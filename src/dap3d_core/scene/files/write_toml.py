@@ -8,7 +8,6 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.kernels.runtime.sealed_files import replace_file
 from dap3d_core.scene.coerce import plain
 from dap3d_core.scene.errors import MISSING, Mistake, SceneError, file_error
 from dap3d_core.scene.tables import NAMED, SCENE_FILE, Element, SceneTables
@@ -50,6 +49,8 @@ def save(scene: SceneTables, path: str | Path, force: bool) -> Path:
         SceneError: the scene holds something a scene file cannot, or the file cannot be written,
             or exists and ``force`` is off.
     """
+    from dap3d_core.kernels.runtime.sealed_files import replace_file
+
     text = to_toml(scene)
     try:
         path = Path(path)
