@@ -1,16 +1,11 @@
 """``dap3d report``: speed against error of every method and integrator on a model."""
 
 import shlex
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from rich.progress import Progress
-from rich.text import Text
 
-from dap3d_core.cli.console.console import Terminal, clean, count, scene_name, seconds
-from dap3d_core.cli.console.progress import LONGEST_PAUSE, ProgressBar, bar_of
 from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command, signals_of
 from dap3d_core.cli.process import exit_codes
@@ -18,7 +13,7 @@ from dap3d_core.cli.process.exit_codes import Refused, Terminated, refusing
 
 if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
-    from dap3d_core.report import MeasuredRun, Report
+    from dap3d_core.report import Report
     from dap3d_core.scene import Scene
 
 
@@ -75,6 +70,7 @@ def report(
     """
     import dap3d_core as dap
     from dap3d_core.cli.console.console import show_data, stderr
+    from dap3d_core.cli.console.report_tables import show_report
 
     scene = dap.load(model)
     files = {"picture": picture, "csv": csv_file, "json": output}
@@ -117,6 +113,7 @@ def _targets(
 def _measure(ctx: click.Context, scene: "Scene", given: dict[str, Any]) -> tuple["Report", int]:
     """The report and an exit code; a report that ends early has what was measured."""
     import dap3d_core as dap
+    from dap3d_core.cli.console.report_tables import ReportProgress
     from dap3d_core.result import Computed
 
     settings: dict[str, Any] = {name: None if v == () else v for name, v in given.items()}
@@ -163,119 +160,3 @@ def _run_command(model: str, given: dict[str, Any]) -> str:
     switches = [f"--{'' if said[n] else 'no-'}{n}" for n in ("correct", "project") if n in said]
     code = ["--allow-code"] * said["allow_code"]
     return " ".join(["dap3d run", shlex.quote(model), *times, *switches, *code])
-
-
-#: Width from which the counts and the constraints are shown.
-WIDE = 76
-#: Errors for which settings are recommended by default.
-TARGETS = (1e-3, 1e-6, 1e-9)
-#: Time to the first line of progress without a terminal, s.
-PAUSE = 5.0
-
-
-class ReportProgress(ProgressBar):
-    """Shows the progress of a report on stderr."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._last_line = time.monotonic()
-        self._pause = PAUSE
-
-    def _make_bar(self) -> Progress:
-        return bar_of(self._console)
-
-    def work(self, done: float, total: float, words: str) -> None:
-        """Show that ``done`` of ``total`` seconds of work are over, and the current work."""
-        if self._bar is not None:
-            shown = clean(words)[: max(12, self._console.width - 44)]
-            if total > done:  # as a fraction: rich drops its estimate when a total changes
-                self._bar.update(self._task, total=1.0, completed=done / total, description=shown)
-            else:
-                self._bar.update(self._task, description=shown)
-        elif (now := time.monotonic()) - self._last_line > self._pause:
-            self._last_line, self._pause = now, min(2.0 * self._pause, LONGEST_PAUSE)
-            left = f", about {seconds(total - done)} left" if total > done else ""
-            self._print(f"{words}{left}")
-
-
-def show_report(console: Terminal, report: "Report", command: str, *, with_target: bool) -> None:
-    """Print a report; ``command`` runs the model once the flags of a setting are appended."""
-    status = "" if report.status == "done" else f": {report.status}"
-    console.title(f"speed against error: {scene_name(report.scene)}{status}")
-    console.facts(
-        [
-            ("simulated", f"t = 0 to {report.t_end:g} s, reported every {report.dt:g} s"),
-            ("reference", _reference(report)),
-            ("uncertainty", _uncertainty(report)),
-            ("expected", _expected(report)),
-        ]
-    )
-    for method, integrator in dict.fromkeys((r.method, r.integrator) for r in report.runs):
-        console.title(f"{method}, {integrator}")
-        runs = [r for r in report.runs if (r.method, r.integrator) == (method, integrator)]
-        _show_runs(console, runs)
-    if report.runs:
-        legend = "* no faster run has a smaller error"
-        if any(run.below_uncertainty for run in report.runs):
-            legend += "; < below the uncertainty of the reference"
-        console.say(legend)
-    failed = [f"{each.setting}: {each.reason}" for each in report.failed]
-    console.section("settings that gave no result", failed, "red")
-    refused = [f"{each.method}: {each.reason}" for each in report.refused]
-    console.section("methods that do not fit", refused)
-    console.section("notes", (*report.reference.notes, *report.notes))
-    console.title("recommended")
-    for target in (None,) if with_target else TARGETS:
-        advice = report.recommended(target)
-        console.say(f"for an error of {advice.target_error:g}: {advice.reason}", indent=2)
-        if advice.flags:
-            console.say(f"{command} {advice.flags}", "green", indent=4, whole=True)
-
-
-def _reference(report: "Report") -> str:
-    first, *second = report.reference.settings
-    return str(first) + (f"; compared with {second[0]}" if second else "; a single run")
-
-
-def _uncertainty(report: "Report") -> str:
-    reference = report.reference
-    if reference.uncertainty is None:
-        return "not known"
-    text = f"{reference.uncertainty:.1e}, the difference of the two"
-    if reference.meaningless_from is not None:
-        last = f"{reference.t[-1]:.6g} s"
-        text += f" up to t = {last}; later they diverge, and errors are meaningless"
-    return text
-
-
-def _expected(report: "Report") -> str:
-    expected = report.reference.expected
-    if expected is None:
-        return ""
-    verdict = "within" if expected.within else "NOT within"
-    values = count(expected.count, "independent value")
-    return (
-        f"{values} of expected.toml, largest deviation {expected.deviation:.1e}, {verdict} the "
-        "tolerances there"
-    )
-
-
-def _show_runs(console: Terminal, runs: "list[MeasuredRun]") -> None:
-    wide = console.width >= WIDE
-    columns = ["", "setting", "time", "error", "energy"]
-    columns += ["|C|", "steps", "rhs"] if wide else ["rhs"]
-    rows = [_row(run, wide=wide) for run in runs]
-    every = range(len(columns))
-    console.table(columns, rows, right=tuple(every)[2:], fixed=tuple(every))
-
-
-def _row(run: "MeasuredRun", *, wide: bool) -> list[str | Text]:
-    return [
-        Text("*" if run.on_front else "", style="bold green"),
-        run.setting.control,
-        seconds(run.time_s),
-        f"{'<' if run.below_uncertainty else ''}{run.error:.1e}",
-        f"{run.energy_error:.1e}",
-        *([f"{run.constraint_error:.0e}", f"{run.counts['steps']:,}"] if wide else []),
-        f"{run.counts['rhs']:,}",
-    ]

@@ -2,6 +2,7 @@
 
 import ctypes
 import os
+import resource
 import threading
 from itertools import count
 
@@ -71,16 +72,14 @@ def test_a_folder_that_may_only_be_read_does_no_harm(tmp_path, alone):
     assert answer(entry_of(tmp_path, optimise=True)) == 42.0
 
 
-def test_a_full_disk_does_no_harm(tmp_path, alone, monkeypatch):
+def test_a_full_disk_does_no_harm(tmp_path, alone):
     """A file that could not be written whole leaves nothing behind."""
-
-    def full(self, data):
-        with open(self, "wb") as file:
-            file.write(data[:10])
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(objects.Path, "write_bytes", full)
-    assert answer(entry_of(tmp_path, optimise=True)) == 42.0
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10, before[1]))
+    try:
+        assert answer(entry_of(tmp_path, optimise=True)) == 42.0
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert list(tmp_path.iterdir()) == []
 
 
