@@ -172,6 +172,7 @@ def test_what_was_switched_stays_switched(opened):
     assert opened.run("dap3d.app.plots.panels.every((p) => p.curves.every((c) => c.values.length))")
 
 
+@pytest.mark.long
 def test_a_point_that_failed_says_why(opened):
     opened.run("dap3d.choose(0, 0)")
     opened.drawn()

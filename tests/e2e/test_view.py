@@ -178,6 +178,7 @@ def test_the_camera_follows_a_body(opened):
     np.testing.assert_allclose(places, np.tile(places[0], (3, 1)), atol=1.0)
 
 
+@pytest.mark.long
 def test_the_mouse_orbits_and_zooms_and_r_brings_back(opened):
     def seen():
         return opened.run("(() => { const p = dap3d.onScreen('crank'); return [p.x, p.y]; })()")
@@ -243,7 +244,10 @@ def test_pixels_are_where_the_body_is(chromium, tmp_path):
     assert page.complaints == []
 
 
-@pytest.mark.parametrize(("size", "theme"), [((1280, 800), "light"), ((390, 844), "dark")])
+@pytest.mark.parametrize(
+    ("size", "theme"),
+    [pytest.param((1280, 800), "light", marks=pytest.mark.long), ((390, 844), "dark")],
+)
 def test_the_whole_motion_is_in_the_frame(chromium, four_page, four, size, theme):
     page = Opened(chromium, four_page, width=size[0], height=size[1], theme=theme)
     width, height = page.run("[dap3d.app.stage.width, dap3d.app.stage.height]")
@@ -291,6 +295,7 @@ def test_two_hundred_bodies_are_drawn_by_few_calls(chromium, tmp_path):
     assert calls < 30
 
 
+@pytest.mark.long
 def test_a_notebook_shows_the_page_in_a_frame(chromium, four, tmp_path):
     (tmp_path / "cell.html").write_text(f"<!DOCTYPE html>{dap.view(four)._repr_html_()}")
     context = chromium.new_context(offline=True)
@@ -388,6 +393,7 @@ def test_a_dense_curve_is_drawn_in_the_order_of_time(chromium, tmp_path):
     assert "time [s]" in words
 
 
+@pytest.mark.long
 def test_a_coarse_curve_is_smooth_between_its_instants(chromium, tmp_path):
     """A parabola is a Bezier curve whose control points are where its tangents meet."""
     pieces, _ = curve_of(chromium, tmp_path, 5)

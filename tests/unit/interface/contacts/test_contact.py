@@ -124,7 +124,9 @@ def test_rates_of_what_is_sought_follow_from_its_equation():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("part", [8, 16, 21, 51])
+@pytest.mark.parametrize(
+    "part", [16, *(pytest.param(k, marks=pytest.mark.long) for k in (8, 21, 51))]
+)
 def test_corners_and_edges_of_boxes_are_exact_derivatives(part):
     class Part(BoxBox):
         keyword = "part_of_boxes"
