@@ -25,7 +25,7 @@ ELSEWHERE = {
 NOT_COPIED = ("README.md",)
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\((?![a-z]+:|#)([^)#\s]+)(#[^)]*)?\)")
 #: Copied beside the pages that show them, or offer them.
-COPIED = (".png", ".svg", ".ipynb")
+COPIED = (".png", ".svg", ".ipynb", ".gif")
 
 
 def fill(source: Path, repository: Path) -> None:

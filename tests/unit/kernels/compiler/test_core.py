@@ -143,7 +143,6 @@ def found(request):
     return repeated(RUNS, ["differentiated"], MORE, [request.param])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "level", ["O0", pytest.param("O3", marks=[pytest.mark.slow, pytest.mark.long])]
 )
