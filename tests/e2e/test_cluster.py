@@ -166,6 +166,7 @@ def test_a_worker_that_is_killed_loses_nothing(alone):
         same(alone, dict(sorted(collected(parts).items())))
 
 
+@pytest.mark.long
 def test_a_worker_that_is_lost_while_it_reports_its_versions_has_no_say(client, alone):
     """It hangs in the middle of the question and dies: the points are computed by the others."""
     with another_worker(client) as address:
@@ -175,6 +176,7 @@ def test_a_worker_that_is_lost_while_it_reports_its_versions_has_no_say(client, 
         same(alone, collected(dask_cluster.run_on(client, bob(), POINTS, PLACES)))
 
 
+@pytest.mark.long
 def test_points_that_kill_their_workers_are_named():
     """Dask gives up after some workers, here one; the message says which points, where to look."""
     import dask
@@ -296,6 +298,7 @@ def test_versions_of_dap3d_are_compared(client, tmp_path, file, text, words):
     assert re.match(f"{re.escape(address)}: {words.format(re.escape(version))}", line)
 
 
+@pytest.mark.long
 def test_a_worker_that_comes_late_is_asked_as_well(installed, tmp_path):
     """By its first task: it does not compute with formulas of its own."""
     late = package(tmp_path / "late", "1.2", k=2.0)
@@ -362,6 +365,7 @@ def test_an_address_without_a_port_leaves_no_half_made_client():
     gc.collect()
 
 
+@pytest.mark.long
 def test_workers_and_schedulers_that_are_gone(tmp_path, monkeypatch):
     """No workers at the start, none any more, and a scheduler that dies: each is one sentence."""
     for name, seconds in (("ARRIVAL", 0.5), ("ABSENCE", 0.5), ("POLL_SECONDS", 0.1)):
