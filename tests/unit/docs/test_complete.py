@@ -69,7 +69,8 @@ def source(site):
     from dap3d_site.staging import everything
 
     found = everything(REPOSITORY)
-    return {path: text.decode() for path, text in found.items() if not path.endswith("png")}
+    pictures = (".png", ".gif")
+    return {path: text.decode() for path, text in found.items() if not path.endswith(pictures)}
 
 
 def shown(name, page):
