@@ -157,12 +157,6 @@ def at_space_curve(r_P_i, r_P_j, A_j, samples, curve):
     return where(square > 0.0, size, 0.0), away, point
 
 
-def polar_samples(f):
-    """Points (s, x, y, z) around a polar curve."""
-    around = [2.0 * math.pi * k / SAMPLES for k in range(SAMPLES)]
-    return [[s, f(s)[0] * math.cos(s), f(s)[0] * math.sin(s), 0.0] for s in around]
-
-
 class PointCurve(Contact):
     """The point P_i, or a roller or ball of ``radius`` about it, at a curve of body j.
 
@@ -227,8 +221,6 @@ class PointCurve(Contact):
             raise ValueError("a curve given by x and y takes s_max, its end, and is not polar")
         if self.radius_j and not in_space:
             raise ValueError("radius_j is that of a wire or pipe, a curve given by x, y and z")
-        if self.polar:  # for pictures: its formulas need no start
-            return {"samples": polar_samples(functions["function"]), "is_closed": 1.0}
         if "x" not in functions:
             return {}
         curve = Curve([functions[name] for name in given], self.s_min, self.s_max)

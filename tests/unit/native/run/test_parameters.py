@@ -49,6 +49,17 @@ def test_masses_and_inertias_give_the_bits_of_simulate(tmp_path, model, names):
 
 
 @pytest.mark.slow
+def test_the_shape_of_a_polar_cam_is_a_parameter(tmp_path):
+    """Nothing is found from its function before a run: neither starts, nor what pictures draw."""
+    scene = dap.Scene(name="cam")
+    scene.add_body("roller", mass=1.0, Jp=[0.1] * 3, r=[1.0, 0.0, 0.0])
+    scene.add_function("harmonic", "lobe", offset=0.5, amplitude=0.1, frequency=1.0)
+    scene.add_contact("point_curve", "cam", P_i="roller.O", function="lobe", polar=True)
+    made, _ = exported(scene, tmp_path, parameters=["functions.lobe.amplitude"])
+    assert tuple(made.parameters) == ("functions.lobe.amplitude",)
+
+
+@pytest.mark.slow
 def test_points_of_joints_move_the_start(tmp_path):
     """It is brought onto the constraints by other code than in Python: equal to rounding."""
     found, expected = compared("fourbar3", ["points.P3.sPp.z"], [1.01], tmp_path)

@@ -16,14 +16,15 @@ def scene():
         scene.add_body(name, mass=1.0, Jp=[0.1] * 3, r=[0.0, 5.0 * k, 3.0])
     scene.add_point("low", body="rod", sPp=[0.0, 0.1, -0.2])
     scene.add_point("high", body="rod", sPp=[0.0, 0.1, 0.4])
-    scene.add_function("harmonic", "lobe", offset=0.5, amplitude=0.1, frequency=1.0)
+    scene.add_function("harmonic", "x", amplitude=0.5, frequency=1.0, phase=0.5 * np.pi)
+    scene.add_function("harmonic", "y", amplitude=0.4, frequency=1.0)
     scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.3)
     scene.add_contact("ball_ball", "in", P_i="ball.O", radius_i=0.3, P_j="bowl.O", radius_j=30.0,
                       inside=True)  # fmt: skip
     scene.add_contact("box_plane", "stands", body_i="box", size=[0.1, 0.2, 0.3])
     scene.add_contact("capsule_plane", "lies", P_i="low", Q_i="high", radius=0.05)
-    scene.add_contact("point_curve", "follows", P_i="ball.O", P_j="cam.O", function="lobe",
-                      polar=True)  # fmt: skip
+    scene.add_contact("point_curve", "follows", P_i="ball.O", P_j="cam.O", x="x", y="y",
+                      s_max=2.0 * np.pi, closed=True)  # fmt: skip
     return scene
 
 
@@ -42,8 +43,7 @@ def test_each_surface_is_drawn_once_where_it_touches(scene):
     assert values["lies"]["length"] == pytest.approx(0.6)
     assert np.linalg.norm(values["in"]["points"], axis=1) == pytest.approx(30.0)
     cam = np.array(values["follows"]["points"])
-    angle = np.arctan2(cam[:, 1], cam[:, 0])
-    assert np.hypot(cam[:, 0], cam[:, 1]) == pytest.approx(0.5 + 0.1 * np.sin(angle))
+    assert np.hypot(cam[:, 0] / 0.5, cam[:, 1] / 0.4) == pytest.approx(1.0)
     assert tuple(cam[0]) == tuple(cam[-1]), "it is closed"
 
 
