@@ -1,7 +1,7 @@
 """Actuators of MJCF: motors and servos of joints and fixed tendons, motors at sites."""
 
 from collections import Counter
-from math import pi, sqrt
+from math import sqrt
 from typing import Any
 
 import attrs
@@ -10,6 +10,7 @@ import numpy as np
 from dap3d_core.interface.formats import (
     LEAST,
     UNBOUNDED,
+    WORLD,
     Actuator,
     FormatError,
     Joint,
@@ -17,13 +18,10 @@ from dap3d_core.interface.formats import (
     Tendon,
     XmlElement,
 )
+from dap3d_formats.mjcf.document import MUSCLE
 from dap3d_formats.mjcf.keyframes import Keyframe, actuators_of
 from dap3d_formats.mjcf.reader import SCALAR, MjcfReader
-from dap3d_formats.mjcf.tendons import length_range, line_of, slopes, tendon_of
-
-#: Numbers of a muscle as MJCF has them in gainprm, with their defaults.
-MUSCLE = {"range": (0.75, 1.05), "force": (-1.0,), "scale": (200.0,), "lmin": (0.5,),
-          "lmax": (1.6,), "vmax": (1.5,), "fpmax": (1.3,), "fvmax": (1.2,)}  # fmt: skip
+from dap3d_formats.mjcf.tendons import length_range, line_of, movers, slopes, tendon_of
 
 Bounds = tuple[float, float]
 
@@ -43,7 +41,7 @@ def read_actuators(reader: MjcfReader, inertia: JointInertia, keyframe: Keyframe
     options = document.root.all("option")
     disabled = {g for one in options for g in one.numbers("actuatorgroupdisable", None, ())}
     elements = actuators_of(document)
-    starts = keyframe.controls(elements, [_dynamics(one) != "none" for one in elements])
+    starts = keyframe.controls(elements, [one.get("dyntype") != "none" for one in elements])
     acting = []
     for element, start in zip(elements, starts, strict=True):
         if element.number("group", 0.0) in disabled:
@@ -54,15 +52,6 @@ def read_actuators(reader: MjcfReader, inertia: JointInertia, keyframe: Keyframe
     reading = ActuatorReader(reader, inertia, [(e, targets) for e, targets, _ in acting])
     for one in acting:
         reading.read(*one)
-
-
-def _dynamics(element: XmlElement) -> str:
-    """How the control of an actuator acts: "none", or the kind of its state."""
-    lag = element.name == "position" and element.number("timeconst", 0.0) > 0.0
-    kinds = {"cylinder": "filter", "intvelocity": "integrator", "muscle": "muscle",
-             "position": "filterexact" if lag else "none"}  # fmt: skip
-    usual = kinds.get(element.name, "none")
-    return element.get("dyntype") or usual if element.name in ("general", "plugin") else usual
 
 
 def _targets(reader: MjcfReader, element: XmlElement) -> list[tuple[str, float]]:
@@ -126,9 +115,22 @@ class ActuatorReader:
         else:
             for joint, gear in targets:
                 self._act_in_joint(element, attrs.evolve(actuator, joint=joint, gear=gear), law)
-        if why:
+            return
+        if not why:
+            self._note_bounds(element, line)
+        else:
             text = f"an actuator <{element.name}>: {why}"
             self.reader.document.source.remarks.leave_out(place, text, motion=True)
+
+    def _note_bounds(self, element: XmlElement, line: Tendon | None) -> None:
+        """Remark on bounds of joints that an actuator moves by a site or a tendon."""
+        if line is None:
+            link, at = self.reader.site(element, "site")
+            line = Tendon("", points=((link, at.r), (WORLD, np.zeros(3))))
+        ranges = self.reader.force_ranges
+        if any(ranges.get(name, UNBOUNDED) != UNBOUNDED for name in movers(self.reader, line)):
+            text = "actuatorfrcrange of a joint that a site, a tendon or a muscle moves"
+            self.reader.document.source.remarks.leave_out(element.place, text, motion=True)
 
     def _line(self, element: XmlElement, targets: list[tuple[str, float]]) -> Tendon | None:
         """The line of the tendon, or of the joint of one coordinate, that an actuator acts on."""
@@ -139,8 +141,7 @@ class ActuatorReader:
 
     def _muscle(self, element: XmlElement, actuator: Actuator, line: Tendon | None) -> str:
         """Add a muscle; why not, or ""."""
-        kinds = (element.get(key, "muscle") for key in ("gaintype", "biastype"))
-        if line is None or (element.name == "general" and set(kinds) != {"muscle"}):
+        if line is None or {element.get("gaintype"), element.get("biastype")} != {"muscle"}:
             return "its law"
         low, high = self._length_range(element, line)
         number = dict(zip(MUSCLE, _muscle_numbers(element), strict=True))
@@ -155,11 +156,6 @@ class ActuatorReader:
                 return "a muscle whose force is scaled by the mass matrix, which is not known"
             force = number["scale"][0] / max(LEAST, abs(gear) * moved)
         times = (*element.numbers("dynprm", None, (1.0,)), 0.0, 0.0)[:3]
-        if element.name == "muscle":
-            times = (
-                *element.numbers("timeconst", 2, (0.01, 0.04)),
-                element.number("tausmooth", 0.0),
-            )
         optimum = (high - low) / (at_high - at_low)
         if not gear or not min(times[:2]) > 0.0:
             return "a muscle of gear 0 or a time constant of 0"
@@ -262,7 +258,7 @@ class ActuatorReader:
 
     def _activation(self, element: XmlElement) -> dict[str, Any] | None:
         """How the control acts by a state: none, a lag, an integral; None for others."""
-        kind = _dynamics(element)
+        kind = element.get("dyntype")
         if kind == "none":
             return {"activation": ""}
         if kind == "muscle":
@@ -273,14 +269,12 @@ class ActuatorReader:
         if kind == "integrator":
             found: dict[str, Any] = {"activation": "integral"}
         else:
-            found = {"activation": "lag", "time": element.number("timeconst", time)}
+            found = {"activation": "lag", "time": time}
         return found | {"active": self._range(element, "act")}
 
 
 def _muscle_numbers(element: XmlElement) -> list[tuple[float, ...]]:
-    """Those of MUSCLE, of <muscle> by name, else of gainprm."""
-    if element.name == "muscle":
-        return [element.numbers(key, len(usual), usual) for key, usual in MUSCLE.items()]
+    """Those of MUSCLE."""
     low, high, *others = (*element.numbers("gainprm", None, (1.0,)), *[0.0] * 9)[:9]
     return [(low, high), *((x,) for x in others)]
 
@@ -296,33 +290,10 @@ def _law(element: XmlElement) -> tuple[float, float, float, float] | None:
 
     A positive b2 of a servo, b1 = -g, is a damping ratio.
     """
-    if element.name == "motor":
-        return 1.0, 0.0, 0.0, 0.0
-    if element.name == "position":
-        kp = element.number("kp", 1.0)
-        if {"kv", "dampratio"} <= element.attributes.keys():
-            raise FormatError("<position> takes kv or dampratio, not both", element.place)
-        ratio = element.number("dampratio", 0.0)  # above 0, as the compiler stores it
-        return kp, 0.0, -kp, ratio if ratio > 0.0 else -element.number("kv", 0.0)
-    if element.name == "velocity":
-        kv = element.number("kv", 1.0)
-        return kv, 0.0, 0.0, -kv
-    if element.name == "intvelocity":
-        kp = element.number("kp", 1.0)
-        return kp, 0.0, -kp, -element.number("kv", 0.0)
-    if element.name == "cylinder":
-        area = element.number("area", 1.0)
-        if "diameter" in element.attributes:
-            area = pi / 4.0 * element.number("diameter") ** 2
-        b0, b1, b2 = element.numbers("bias", 3, (0.0, 0.0, 0.0))
-        return area, b0, b1, b2
-    plain = {"gaintype": ("fixed",), "biastype": ("none", "affine")}
-    if element.name != "general" or any(
-        element.get(key, words[0]) not in words for key, words in plain.items()
-    ):
+    if element.get("gaintype") != "fixed" or element.get("biastype") not in ("none", "affine"):
         return None
     gain = element.numbers("gainprm", None, (1.0,))[0]
-    if element.get("biastype", "none") == "none":
+    if element.get("biastype") == "none":
         return gain, 0.0, 0.0, 0.0
     b0, b1, b2 = (*element.numbers("biasprm", None, (0.0,)), 0.0, 0.0)[:3]
     return gain, b0, b1, b2

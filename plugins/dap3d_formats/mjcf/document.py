@@ -1,5 +1,11 @@
-"""An MJCF document: included files, settings of the compiler, default classes."""
+"""An MJCF document: included files, settings of the compiler, default classes.
 
+A class has one law of its actuators, that of its last element of them. An element has the law of
+the nearest class that has one of its own name or of <general>; <general> that of its class,
+whatever it is named. Laws are kept in the words of <general>.
+"""
+
+from collections.abc import Iterator, Mapping
 from math import pi
 from pathlib import Path
 from typing import Any
@@ -23,6 +29,16 @@ ACTUATORS = (
     "general", "motor", "position", "velocity", "intvelocity", "damper", "cylinder", "muscle",
     "adhesion", "dcmotor", "orientation", "pid", "plugin",
 )  # fmt: skip
+#: Lists whose first numbers alone may be given: the others are those of the class.
+LISTS = {"size", "friction", "gear", "stiffness", "damping", "gainprm", "biasprm", "dynprm"}
+#: Words of a law.
+LAW = ("gaintype", "gainprm", "biastype", "biasprm", "dyntype", "dynprm")
+#: Numbers of a muscle as MJCF has them in gainprm, with their defaults.
+MUSCLE = {"range": (0.75, 1.05), "force": (-1.0,), "scale": (200.0,), "lmin": (0.5,),
+          "lmax": (1.6,), "vmax": (1.5,), "fpmax": (1.3,), "fvmax": (1.2,)}  # fmt: skip
+
+Words = Mapping[str, str]
+Parts = Iterator[tuple[str, tuple[object, ...]]]
 
 
 @attrs.define(eq=False)
@@ -62,8 +78,7 @@ class Settings:
             own.setdefault(tag, {}).update(values)
         for child in element:
             if child.name != "default":
-                tag = _kind(child.name)
-                own[tag] = _under(own.get(tag, {}), child.attributes)
+                _add_to_class(own, inherited, child)
         self.defaults[name] = own
         for child in element.all("default"):
             self._read_defaults(child, child.require("class"), own)
@@ -112,8 +127,12 @@ class Document:
             known = ", ".join(defaults)
             raise FormatError(f"there is no default class {name!r}; classes: {known}",
                               element.place)  # fmt: skip
-        values = defaults[name].get(_kind(element.name), {})
-        return attrs.evolve(element, attributes=_under(values, element.attributes))
+        kind, values = _kind(element.name), defaults[name]
+        given = _under(values.get(kind, {}), element.attributes)
+        if kind == "actuator":
+            given |= {"gaintype": "fixed", "biastype": "none", "dyntype": "none"}
+            given |= _law_of(values, element)
+        return attrs.evolve(element, attributes=given)
 
     def settled_equality(self, element: XmlElement) -> XmlElement:
         """An equality with the attributes of its class, which all equalities share."""
@@ -192,16 +211,6 @@ class Document:
         return euler_angles([times * self.angle(a, element) for a in angles], sequence)
 
 
-def _kind(tag: str) -> str:
-    return "actuator" if tag in ACTUATORS else tag
-
-
-def _under(values: dict[str, str], own: dict[str, str]) -> dict[str, str]:
-    """Attributes of a class under those below it; `kv` and `dampratio` replace each other."""
-    replaced = {"kv": "dampratio", "dampratio": "kv"}
-    return {key: text for key, text in values.items() if replaced.get(key) not in own} | own
-
-
 def _include(source: Source, element: XmlElement, folder: Path) -> None:
     """Put what included files hold in their places, all over a tree."""
     children: list[XmlElement] = []
@@ -230,3 +239,125 @@ def _xyaxes(element: XmlElement) -> Any:
 def cross(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, float, float]:
     """The cross product."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def _kind(tag: str) -> str:
+    """The word by which a class knows an element."""
+    return "actuator" if tag in ACTUATORS else tag
+
+
+def _under(values: Words, own: Words) -> dict[str, str]:
+    """Attributes of a class under those of an element, of which lists may be shorter."""
+    merged = {**values, **own}
+    for key in LISTS & values.keys() & own.keys():
+        given = own[key].split()
+        merged[key] = " ".join(given + values[key].split()[len(given) :])
+    return merged
+
+
+def _add_to_class(own: dict[str, dict[str, str]], outer: Mapping[str, Words], element: XmlElement
+                 ) -> None:  # fmt: skip
+    """Add an element of a default class to its attributes by kind.
+
+    Args:
+        own: attributes of the class so far, with those that it inherits.
+        outer: those of the class around it.
+        element: the element.
+    """
+    name, kind = element.name, _kind(element.name)
+    given = {key: word for key, word in element.attributes.items() if key not in LAW}
+    own[kind] = _under(own.get(kind, {}), given)
+    if kind != "actuator":
+        return
+    law = _law_of(own, element)
+    for tag in [tag for tag in own if tag.startswith("law ")]:
+        del own[tag]
+    if name == "general":
+        own |= {"law general": law, "law ": law}
+    else:
+        own |= {tag: dict(words) for tag, words in outer.items() if tag.startswith("law ")}
+        own |= {"law general": law, f"law {name}": law}
+
+
+def _law_of(values: Mapping[str, Words], element: XmlElement) -> dict[str, str]:
+    """The law of an actuator of a class, in the words of <general>.
+
+    Raises:
+        FormatError: numbers are missing, or two contradict each other.
+    """
+    base = values.get(f"law {element.name}", values.get("law ", {}))
+    if element.name != "general" and base.get("gaintype", "fixed") not in ("fixed", element.name):
+        base = {}  # of a class of <general> over a muscle
+    above = XmlElement(element.name, dict(base), element.place)
+    if element.name in ("general", "plugin"):
+        return _under(base, {key: word for key, word in element.attributes.items() if key in LAW})
+    if element.name not in _LAWS:
+        return {"gaintype": element.name}
+    return {key: " ".join(map(str, word)) for key, word in _LAWS[element.name](element, above)}
+
+
+def _motor(element: XmlElement, base: XmlElement) -> Parts:
+    yield "gainprm", (1.0,)
+
+
+def _servo(element: XmlElement, base: XmlElement) -> Parts:
+    """Gain kp, bias -kp q - kv q_dot; a positive third number is a damping ratio."""
+    if {"kv", "dampratio"} <= element.attributes.keys():
+        raise FormatError(f"<{element.name}> takes kv or dampratio, not both", element.place)
+    kp = element.number("kp", base.numbers("gainprm", None, (1.0,))[0])
+    rate = (*base.numbers("biasprm", None, (0.0,)), 0.0, 0.0)[2]
+    if "kv" in element.attributes:
+        rate = -element.number("kv")
+    ratio = element.number("dampratio", 0.0)  # above 0, as the compiler stores it
+    yield "gainprm", (kp,)
+    yield "biastype", ("affine",)
+    yield "biasprm", (0.0, -kp, ratio if ratio > 0.0 else rate)
+    if element.name == "intvelocity":
+        yield "dyntype", ("integrator",)
+        return
+    lag = base.numbers("dynprm", None, (1.0,))[0] if base.get("dyntype") == "filterexact" else 0.0
+    lag = element.number("timeconst", lag)
+    if lag > 0.0:
+        yield "dyntype", ("filterexact",)
+        yield "dynprm", (lag,)
+
+
+def _velocity(element: XmlElement, base: XmlElement) -> Parts:
+    kv = element.number("kv", base.numbers("gainprm", None, (1.0,))[0])
+    yield "gainprm", (kv,)
+    yield "biastype", ("affine",)
+    yield "biasprm", (0.0, 0.0, -kv)
+
+
+def _cylinder(element: XmlElement, base: XmlElement) -> Parts:
+    area = element.number("area", base.numbers("gainprm", None, (1.0,))[0])
+    if "diameter" in element.attributes:
+        area = pi / 4.0 * element.number("diameter") ** 2
+    yield "gainprm", (area,)
+    yield "biastype", ("affine",)
+    bias = (*base.numbers("biasprm", None, (0.0,)), 0.0, 0.0)[:3]
+    yield "biasprm", element.numbers("bias", 3, bias)
+    yield "dyntype", ("filter",)
+    lag = base.numbers("dynprm", None, (1.0,))[0]
+    yield "dynprm", (element.number("timeconst", lag),)
+
+
+def _muscle(element: XmlElement, base: XmlElement) -> Parts:
+    numbers = [x for usual in MUSCLE.values() for x in usual]
+    times: tuple[float, ...] = (0.01, 0.04, 0.0)
+    if base.get("gaintype") == "muscle":
+        numbers = list(base.numbers("gainprm", None, tuple(numbers)))
+        times = (*base.numbers("dynprm", None, times), 0.0, 0.0)[:3]
+    at = 0
+    for key, usual in MUSCLE.items():
+        end = at + len(usual)
+        numbers[at:end] = element.numbers(key, len(usual), tuple(numbers[at:end]))
+        at = end
+    yield "gainprm", tuple(numbers)
+    yield "dynprm", (*element.numbers("timeconst", 2, times[:2]),
+                     element.number("tausmooth", times[2]))  # fmt: skip
+    yield from ((key, ("muscle",)) for key in ("gaintype", "biastype", "dyntype"))
+
+
+_LAWS = {"motor": _motor, "position": _servo, "intvelocity": _servo, "velocity": _velocity,
+         "cylinder": _cylinder, "muscle": _muscle}  # fmt: skip

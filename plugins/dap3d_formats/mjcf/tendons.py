@@ -182,9 +182,9 @@ def length_range(reader: MjcfReader, line: Tendon) -> tuple[float, float]:
         return (float(ends[0]), float(ends[1])) if np.isfinite(ends).all() else (0.0, 0.0)
     from scipy.optimize import minimize  # few files need it
 
-    movers = _movers(reader, line)
-    leads = {one.joint: one for one in reader.model.couplings if one.joint in movers}
-    free = {joint.name: joint for joint in movers.values() if joint.name not in leads}
+    moving = movers(reader, line)
+    leads = {one.joint: one for one in reader.model.couplings if one.joint in moving}
+    free = {joint.name: joint for joint in moving.values() if joint.name not in leads}
     for one in leads.values():
         free[one.other] = joints[one.other]
     bounds = [(joint.limits[0].lower, joint.limits[0].upper) for joint in free.values()]
@@ -214,19 +214,21 @@ def slopes(reader: MjcfReader, line: Tendon) -> dict[str, float] | None:
     """By what the length grows with each joint, where the file draws it; None for balls."""
     if line.terms:
         return dict(line.terms)
-    movers = _movers(reader, line)
-    if any(joint.kind not in SCALAR for joint in movers.values()):
+    moving = movers(reader, line)
+    if any(joint.kind not in SCALAR for joint in moving.values()):
         return None
 
     def length(name: str, q: float) -> float:
         poses: dict[str, Frame] = {}
         return length_of_line(line, lambda link: pose_of(reader, link, {name: q}, poses))
 
-    return {n: (length(n, CHANGE) - length(n, -CHANGE)) / (2.0 * CHANGE) for n in movers}
+    return {n: (length(n, CHANGE) - length(n, -CHANGE)) / (2.0 * CHANGE) for n in moving}
 
 
-def _movers(reader: MjcfReader, line: Tendon) -> dict[str, Joint]:
-    """The joints that move a part of the tendon against another."""
+def movers(reader: MjcfReader, line: Tendon) -> dict[str, Joint]:
+    """The joints that move a part of the tendon against another, or that it is a sum of."""
+    if line.terms:
+        return {name: reader.model.joints[name] for name, _ in line.terms}
     above = {joint.child: joint for joint in reader.model.joints.values() if not joint.closes}
     links = {link for link, _ in line.points} | {drum.link for drum in line.drums}
     chains = []
