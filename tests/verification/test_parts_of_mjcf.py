@@ -81,3 +81,47 @@ def test_a_mesh_that_is_scaled_after_a_quarter_turn(tmp_path, half):
     p = shape["p"]
     found = Rotation.from_quat(np.roll(p, -1)).apply(np.array(shape["scale"]) * corners)
     np.testing.assert_allclose(found + shape["at"], expected, rtol=0, atol=1e-12)
+
+
+LOCKED = """<worldbody><body name="base"><inertial pos="0.02 0 0" mass="1" diaginertia="1 1 1"/>{}
+  <body name="arm"><joint name="a" armature="0.1"/><joint name="b" axis="-0.4 0.7 0.6"/>
+  <inertial pos="-0.08 0.04 0.07" mass="1.6" diaginertia="0.015 0.017 0.03"/></body></body>
+  </worldbody>"""
+
+
+def test_a_base_that_a_loop_locks_is_as_one_without_a_joint(tmp_path):
+    """Two of three rows of the loop depend on the third; a link without mass follows a rotor."""
+    text = LOCKED.format('<joint name="j"/>')
+    closed = '<equality><connect body1="base" anchor="-0.1 -0.05 0.1"/></equality>'
+    found = []
+    for k, model in enumerate((text + closed, LOCKED.format(""))):
+        scene, _ = imported(tmp_path / f"{k}.xml", model)
+        assert scene.simulation.method == "joint"
+        model = dap.compile(scene)
+        rates = model.rhs(0.0, model.model.u0)[7 * len(scene.bodies) :].reshape(-1, 6)
+        found.append(rates[list(scene.bodies).index("arm")])
+    np.testing.assert_allclose(*found, rtol=1e-9)
+
+
+CLASSES = """<default><position kp="5" kv="3"/><default class="turns"><motor gear="2 3"/></default>
+  </default><worldbody><body><joint name="q"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+  </body></worldbody><actuator>{}</actuator>"""
+
+
+@pytest.mark.parametrize(
+    ("actuator", "gain", "k", "c"),
+    [
+        ('<general joint="q"/>', 5.0, 5.0, 3.0),
+        ('<general joint="q" biasprm="0 -2"/>', 5.0, 2.0, 3.0),
+        ('<velocity joint="q"/>', 1.0, 0.0, 1.0),
+        ('<position joint="q" class="turns"/>', 10.0, 20.0, 12.0),
+        ('<general joint="q" class="turns"/>', 2.0, 0.0, 0.0),
+    ],
+)
+def test_laws_of_actuators_by_their_classes(tmp_path, actuator, gain, k, c):
+    """Of the nearest class with a law of that name, or of <general>; as MuJoCo 4.0 compiles it."""
+    scene, _ = imported(tmp_path / "a.xml", CLASSES.format(actuator))
+    (motor,) = [f.fields["np"][2] for f in scene.forces.values() if f.type == "np"]
+    given = [f.fields for f in scene.forces.values() if f.type == "rot_sda"]
+    sums = [sum(one.get(key) or 0.0 for one in given) for key in ("k", "c")]
+    assert [motor, *sums] == [gain, k, c]

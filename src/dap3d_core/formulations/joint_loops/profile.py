@@ -30,14 +30,16 @@ LEAST_FREE = 1e-4
 def weigh_kept_rows(system: System, part: float) -> None:
     """E: ``part`` of the diagonal of ``matrix``; 0.0 where rows are independent.
 
-    At least that of ``LEAST_FREE`` of the row's square in the metric of its bodies: the tree may
-    hold all that a row would move.
+    At least that of ``LEAST_FREE`` of the row's square in the metric of the heaviest of its bodies:
+    the tree may hold all that a row would move. Of the lightest, a link without mass, it is many
+    times what the row feels, and no pass would come near the rows.
     """
     kept = system.tree.kept
     for j in range(kept.compliance.shape[0]):
         kept.compliance[j] = 0.0
     if part == 0.0:
         return
+    contacts = system.contacts.shape[0] > 0
     cuts, ends, D = pointer(kept.cuts), pointer(kept.ends), pointer(kept.D)
     for q in range(kept.cuts.shape[0]):
         c = layout.CUT_WIDTH * q
@@ -48,9 +50,11 @@ def weigh_kept_rows(system: System, part: float) -> None:
                 d = ends[layout.END_WIDTH * e + layout.END_BLOCK] + 6 * r
                 x, y, z = in_body_axes(s, D[d + 3], D[d + 4], D[d + 5])
                 x, y, z = scaled_moment(k, x, y, z)
-                shift = (D[d] * D[d] + D[d + 1] * D[d + 1] + D[d + 2] * D[d + 2]) * k[0] * k[0]
-                kept.compliance[cuts[c + layout.FIRST] + r] += shift + x * x + y * y + z * z
-    contacts = system.contacts.shape[0] > 0
+                own = (D[d] * D[d] + D[d + 1] * D[d + 1] + D[d + 2] * D[d + 2]) * k[0] * k[0]
+                own, row = own + x * x + y * y + z * z, cuts[c + layout.FIRST] + r
+                others = kept.compliance[row]
+                least = where((own > 0.0) & (own < others), own, others)
+                kept.compliance[row] = where(contacts | (others == 0.0), others + own, least)
     for j in range(kept.compliance.shape[0]):
         diagonal = kept.matrix[kept.profile[j, layout.PLACE] + j]
         least = LEAST_FREE * kept.compliance[j]
