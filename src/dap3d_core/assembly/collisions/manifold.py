@@ -6,14 +6,16 @@ from dap3d_core.assembly.collisions.distance import dot
 from dap3d_core.assembly.collisions.placed_shapes import GAP, PlacedShapes, add
 from dap3d_core.assembly.collisions.supports import (
     CLIPPED_CORNERS,
+    CORNERS,
     RIM,
     extent_of,
     near_support,
+    put_crossed,
     radius_of,
 )
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.scene.contacts.collision_shapes import CYLINDER, PLANE
+from dap3d_core.scene.contacts.collision_shapes import CYLINDER, HULL, PLANE
 
 #: Rows of scratch: polygons of i and j, their points while one is clipped; tangents; middle of a
 #: cap, and the way from there to what touches it.
@@ -131,17 +133,17 @@ def inside(work: Floats, start: int, count: int, other: int, corners: int, size:
 
 
 @compiled
-def put_middle(work: Floats, start: int, out: int) -> None:
-    """The middle of the points of a cap."""
+def put_middle(work: Floats, start: int, count: int, out: int) -> None:
+    """The middle of the points of a face."""
     for k in range(3):
         work[out, k] = 0.0
-        for c in range(RIM):
-            work[out, k] += work[start + c, k] / RIM
+        for c in range(count):
+            work[out, k] += work[start + c, k] / count
 
 
 @compiled
 def put_way(shapes: PlacedShapes, j: int, other: int, corners: int, n: Floats) -> float:
-    """Put the way across n from the middle of a cap to the nearest point of j; its length."""
+    """Put the way across n from the middle of a face to the nearest point of j; its length."""
     work, least, over = shapes.work, 1e300, corners > 2
     middle, way, x = work[MIDDLE], work[WAY], work[E2 + 1]
     is_cap = shapes.kind[j] == CYLINDER and corners == RIM  # to its middle, and its radius less
@@ -152,7 +154,7 @@ def put_way(shapes: PlacedShapes, j: int, other: int, corners: int, n: Floats) -
         along = min(max(along / square, 0.0), 1.0) if square > 0.0 else 0.0
         over = over and turn(p, q, middle, work) >= 0.0
         if is_cap:
-            put_middle(work, other, E2 + 1)
+            put_middle(work, other, RIM, E2 + 1)
         for k in range(3):
             x[k] = (x[k] if is_cap else p[k] + along * (q[k] - p[k])) - middle[k]
         high = dot(x, n)
@@ -170,21 +172,31 @@ def put_way(shapes: PlacedShapes, j: int, other: int, corners: int, n: Floats) -
 @compiled
 def face(
     shapes: PlacedShapes, i: int, start: int, count: int, j: int, other: int, corners: int,
-    n: Floats,
-) -> None:  # fmt: skip
-    """Turn the points of a cap towards solid j where that touches it next to its rim.
+    sign: float, n: Floats, band: float,
+) -> int:  # fmt: skip
+    """Turn the points of a face towards solid j where that touches it next to its border.
 
-    Between two of them the rim lies beyond their chord, and what touches there alone had no point.
+    Of a cap, or a face of many corners, they are some of the border, which lies beyond the chords
+    between them: what touches there alone had no point. Returns their number.
     """
-    if shapes.kind[i] != CYLINDER or count != RIM:
-        return
-    work, radius = shapes.work, shapes.size[i, 0]
-    put_middle(work, start, MIDDLE)
-    if put_way(shapes, j, other, corners, n) <= WITHIN * radius:
-        return
-    way = work[WAY]
+    work, way = shapes.work, shapes.work[WAY]
+    is_hull = shapes.kind[i] == HULL and shapes.corners[i, 1] > CORNERS and count > 2
+    if not is_hull and (shapes.kind[i] != CYLINDER or count != RIM):
+        return count
+    radius = 0.0 if is_hull else shapes.size[i, 0]
+    put_middle(work, start, count, MIDDLE)
+    far = put_way(shapes, j, other, corners, n)
     length = math.sqrt(dot(way, way))
-    x, y, z = way[0] / length, way[1] / length, way[2] / length
+    if far <= WITHIN * radius or length == 0.0:
+        return count
+    for k in range(3):
+        way[k] /= length
+    x, y, z = way[0], way[1], way[2]
+    if is_hull:
+        for k in range(3):
+            work[MIDDLE, k] += far * way[k]
+        count = put_crossed(shapes, i, sign, n, band, start, count, way, work[MIDDLE])
+        return outline(work, start, count)
     for c in range(RIM):  # turning left, as ``outline`` leaves them
         angle = 2.0 * math.pi / RIM * c
         e, f = radius * math.cos(angle), radius * math.sin(angle)
@@ -192,6 +204,7 @@ def face(
         p[0] = work[MIDDLE, 0] + e * x + f * (n[1] * z - n[2] * y)
         p[1] = work[MIDDLE, 1] + e * y + f * (n[2] * x - n[0] * z)
         p[2] = work[MIDDLE, 2] + e * z + f * (n[0] * y - n[1] * x)
+    return count
 
 
 @compiled
@@ -265,8 +278,8 @@ def points_within(
     single, from_i, left, passing = ni == 1 or nj == 1, ni == 1, 1, gap
     if not single:
         ni, nj = outline(work, POLYGON, ni), outline(work, OTHER, nj)
-        face(shapes, i, POLYGON, ni, j, OTHER, nj, n)
-        face(shapes, j, OTHER, nj, i, POLYGON, ni, n)
+        ni = face(shapes, i, POLYGON, ni, j, OTHER, nj, -1.0, n, band)
+        nj = face(shapes, j, OTHER, nj, i, POLYGON, ni, 1.0, n, band)
         from_i = spread(work, OTHER, nj, n) <= spread(work, POLYGON, ni, n)
         if ni == 2 and nj == 2:
             single = crossing(work)

@@ -145,25 +145,24 @@ def near_support(
                     put_global(shapes, k, p, q, s, shapes.work[start + count])
                 count += 1
     if count > CORNERS:
-        return _farthest_around(shapes, k, x, y, z, best - band, start)
+        return _farthest_around(shapes, k, x, y, z, best - band, start, 0)
     return count
 
 
 @compiled
 def _farthest_around(
-    shapes: PlacedShapes, k: int, x: float, y: float, z: float, least: float, start: int
+    shapes: PlacedShapes, k: int, x: float, y: float, z: float, least: float, start: int, count: int
 ) -> int:
     """Put the vertex of a hull farthest along (x, y, z), in its axes, and those farthest around it.
 
-    They are the farthest in CORNERS - 1 directions across that, of those beyond ``least`` along it.
-    Returns their number.
+    They are the farthest in directions across that, of those beyond ``least`` along it, as many as
+    ``count``, what is there already, leaves of CORNERS. Returns the number of all.
     """
-    vertices, first, count = shapes.vertices, shapes.corners[k, 0], 0
-    one, ring, last = -1, -1, -1
+    vertices, first, total = shapes.vertices, shapes.corners[k, 0], CORNERS - count
     e0, e1, e2 = (0.0, z, -y) if abs(x) < 0.6 else (-z, 0.0, x)
     f0, f1, f2 = y * e2 - z * e1, z * e0 - x * e2, x * e1 - y * e0
-    for side in range(CORNERS):
-        angle = 2.0 * math.pi / (CORNERS - 1) * side
+    for side in range(total):
+        angle = 2.0 * math.pi / (total - 1) * side
         a, b, best, at = math.cos(angle), math.sin(angle), -1e300, first
         p, q, s = a * e0 + b * f0, a * e1 + b * f1, a * e2 + b * f2
         if side == 0:
@@ -173,9 +172,79 @@ def _farthest_around(
             far = v[0] * p + v[1] * q + v[2] * s
             if far > best and v[0] * x + v[1] * y + v[2] * z >= least:
                 best, at = far, c
-        if side == 0 or (at != one and at != ring and at != last):
-            put_global(shapes, k, vertices[at, 0], vertices[at, 1], vertices[at, 2],
-                       shapes.work[start + count])  # fmt: skip
-            count += 1
-        one, ring, last = (at if side == 0 else one), (at if side == 1 else ring), at
+        count = _put_vertex(shapes, k, at, start, count)
     return count
+
+
+@compiled
+def _put_vertex(shapes: PlacedShapes, k: int, at: int, start: int, count: int) -> int:
+    """Append a vertex of a hull to ``count`` rows of scratch, if it is none of them; the number."""
+    v, last = shapes.vertices[at], shapes.work[start + count]
+    put_global(shapes, k, v[0], v[1], v[2], last)
+    for c in range(start, start + count):
+        p = shapes.work[c]
+        if p[0] == last[0] and p[1] == last[1] and p[2] == last[2]:
+            return count
+    return count + 1
+
+
+@compiled
+def put_crossed(
+    shapes: PlacedShapes, k: int, sign: float, d: Floats, band: float, start: int, count: int,
+    way: Floats, at: Floats,
+) -> int:  # fmt: skip
+    """Put the ``count`` points of a face of a hull anew, the edges first that a line crosses.
+
+    The line is across d and the unit ``way``, through ``at``; the farthest vertex along the way is
+    put as well. Of a face of few corners, or that the line misses, the points stay.
+
+    Returns:
+        Their number, CORNERS at most.
+    """
+    u, vertices = shapes.axes[k], shapes.vertices
+    first, last = shapes.corners[k, 0], shapes.corners[k, 0] + shapes.corners[k, 1]
+    x = sign * dot_axis(u, 0, d[0], d[1], d[2])
+    y = sign * dot_axis(u, 1, d[0], d[1], d[2])
+    z = sign * dot_axis(u, 2, d[0], d[1], d[2])
+    a, b = dot_axis(u, 0, way[0], way[1], way[2]), dot_axis(u, 1, way[0], way[1], way[2])
+    c = dot_axis(u, 2, way[0], way[1], way[2])
+    e, f, g = y * c - z * b, z * a - x * c, x * b - y * a
+    level, high, near, top, low = 0.0, -1e300, 0, first, first
+    for r in range(3):
+        level += way[r] * (at[r] - shapes.centre[k, r])
+    for m in range(first, last):
+        high = max(high, vertices[m, 0] * x + vertices[m, 1] * y + vertices[m, 2] * z)
+    far, deep = -1e300, 1e300
+    for m in range(first, last):
+        v = vertices[m]
+        if v[0] * x + v[1] * y + v[2] * z >= high - band:
+            near, along = near + 1, v[0] * a + v[1] * b + v[2] * c - level
+            top, far = (m, along) if along > far else (top, far)
+            low, deep = (m, along) if along < deep else (low, deep)
+    if near <= CORNERS or far <= 0.0 or deep >= 0.0:
+        return count
+    count = _put_vertex(shapes, k, top, start, 0)
+    for side in range(2):
+        over, under, kept = top, low, 0
+        for turn in range(2 * near):  # one end of the edge, then the other, until both stay
+            best, new, o = -1e300, -1, vertices[under if turn % 2 == 0 else over]
+            beyond = o[0] * a + o[1] * b + o[2] * c - level
+            to = o[0] * e + o[1] * f + o[2] * g
+            old = over if turn % 2 == 0 else under
+            for m in range(first, last):
+                v = vertices[m]
+                along = v[0] * a + v[1] * b + v[2] * c - level
+                if (along >= 0.0) == (turn % 2 == 0) and (
+                    v[0] * x + v[1] * y + v[2] * z >= high - band
+                ):
+                    s = v[0] * e + v[1] * f + v[2] * g
+                    s = (1.0 - 2.0 * side) * (s * beyond - to * along) / (beyond - along)
+                    if s > best or (s == best and m == old):
+                        best, new = s, m
+            kept = kept + 1 if new == old else 0
+            over, under = (new, under) if turn % 2 == 0 else (over, new)
+            if kept == 2:
+                break
+        count = _put_vertex(shapes, k, over, start, count)
+        count = _put_vertex(shapes, k, under, start, count)
+    return _farthest_around(shapes, k, x, y, z, high - band, start, count)

@@ -189,6 +189,30 @@ def test_what_touches_a_cap_next_to_its_rim_touches_it(kind, part):
     assert (found.point[:, :2] @ way).min() == pytest.approx(part * radius, abs=1e-9) or part == 0.5
 
 
+@pytest.mark.parametrize("part", [0.6, 0.98, 0.9999])
+@pytest.mark.parametrize("turned", [0.0, 0.04, 1.2])
+@pytest.mark.parametrize("size", [(0.5, 0.5), (0.1, 1.0)])
+def test_rods_next_to_the_border_of_a_face_of_many_corners_lie_on_it(size, turned, part):
+    """At both ends of the line that they have on it: chords of 15 corners, and more so of a long
+    face, leave parts of the face out."""
+    corners = prism(40)[:40, :2] * size
+    way = np.array([np.cos(turned), np.sin(turned)])
+    along, heights = np.array([-way[1], way[0]]), corners @ way
+    level, ends = part * heights.max(), []
+    for p, q in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        a, b = p @ way - level, q @ way - level
+        if a * b < 0.0:
+            ends.append((p + a / (a - b) * (q - p)) @ along)
+    half = 0.5 * turned  # z along y, turned before
+    lies = np.array([np.cos(half), np.cos(half), np.sin(half), np.sin(half)]) / np.sqrt(2)
+    lies = np.array([lies[0], -lies[1], -lies[2], lies[3]])
+    pair = finder([HULL, CAPSULE], [[*size, 0.3], [0.1, 4.0, 0.0]], (prism(40), WAYS))
+    r = np.array([np.zeros(3), [*(level * way), 0.4 + 1e-9]])
+    found = pair.find(r, np.array([[1.0, 0, 0, 0], lies]), np.full(3, 1e-3))
+    assert found.gap == pytest.approx([1e-9] * 2, abs=1e-15)
+    assert sorted(found.point[:, :2] @ along) == pytest.approx(sorted(ends), abs=1e-9)
+
+
 def test_boxes_meet_where_their_faces_and_edges_do():
     """Stacked boxes have the corners of the smaller face; crossed edges one point, by geometry."""
     boxes = finder([BOX, BOX], [[0.5, 0.5, 0.5], [0.2, 0.2, 0.2]])
