@@ -125,3 +125,16 @@ def test_laws_of_actuators_by_their_classes(tmp_path, actuator, gain, k, c):
     given = [f.fields for f in scene.forces.values() if f.type == "rot_sda"]
     sums = [sum(one.get(key) or 0.0 for one in given) for key in ("k", "c")]
     assert [motor, *sums] == [gain, k, c]
+
+
+def test_what_an_element_has_of_a_class_in_parts(tmp_path):
+    """Its own turn replaces that of the class in other words; of lists the class has the rest."""
+    text = """<default><geom axisangle="0 0 1 90" friction="0.5 0.1 0.2" size="1 2 3" type="box"/>
+      </default><worldbody><body><freejoint/><geom euler="90 0 0" friction="2" size="4"
+      condim="6"/></body></worldbody>"""
+    (tmp_path / "a.xml").write_text(f"<mujoco>{text}</mujoco>")
+    scene, _ = dap.import_model(tmp_path / "a.xml", contacts=True)
+    (shape,), (material,) = scene.shapes.values(), scene.materials.values()
+    assert shape.fields["size"] == (8.0, 4.0, 6.0)
+    assert shape.fields["p"] == pytest.approx([0.5**0.5, 0.5**0.5, 0.0, 0.0], abs=1e-15)
+    assert (material.mu, material.mu_spin, material.mu_roll) == (2.0, 0.1, 0.2)

@@ -31,6 +31,8 @@ ACTUATORS = (
 )  # fmt: skip
 #: Lists whose first numbers alone may be given: the others are those of the class.
 LISTS = {"size", "friction", "gear", "stiffness", "damping", "gainprm", "biasprm", "dynprm"}
+#: How an element is turned; one is given.
+TURNS = {"quat", "axisangle", "euler", "xyaxes", "zaxis"}
 #: Words of a law.
 LAW = ("gaintype", "gainprm", "biastype", "biasprm", "dyntype", "dynprm")
 #: Numbers of a muscle as MJCF has them in gainprm, with their defaults.
@@ -248,7 +250,8 @@ def _kind(tag: str) -> str:
 
 def _under(values: Words, own: Words) -> dict[str, str]:
     """Attributes of a class under those of an element, of which lists may be shorter."""
-    merged = {**values, **own}
+    turned = TURNS if TURNS & own.keys() else set()
+    merged = {key: word for key, word in values.items() if key not in turned} | dict(own)
     for key in LISTS & values.keys() & own.keys():
         given = own[key].split()
         merged[key] = " ".join(given + values[key].split()[len(given) :])
