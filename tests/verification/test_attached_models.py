@@ -168,19 +168,21 @@ def test_a_body_is_attached_without_the_frames_around_it(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("key", "same"),
+    ("key", "same", "which"),
     [
-        ("x_bent", 'qpos="0 0.1 0.2 0.3 0.4 0" ctrl="0 1 2 3" act="4"'),
-        ("short", 'qpos="0.6 0.5 0 0 0 0" ctrl="7 0 0 0"'),
-        ("own", 'qpos="1 0.1 0.2 0.3 0.4 0.5" ctrl="1 2 3 4" act="5"'),
+        ("x_bent", 'qpos="0 0.1 0.2 0.3 0.4 0" ctrl="0 1 2 3" act="4"', ""),
+        ("x_bent", 'qpos="0 0.1 0.2 0" ctrl="0 2 3" act="4"', 'body="upper"'),
+        ("short", 'qpos="0.6 0.5 0 0 0 0" ctrl="7 0 0 0"', ""),
+        ("own", 'qpos="1 0.1 0.2 0.3 0.4 0.5" ctrl="1 2 3 4" act="5"', ""),
     ],
 )
-def test_keyframes_of_both(tmp_path, key, same):
-    """That of the arm is of its joints; an own one has all, or the first of them."""
+def test_keyframes_of_both(tmp_path, key, same, which):
+    """That of the arm is of its joints, or those attached; an own one has all, or the first."""
     keys = """<keyframe><key name="short" qpos="0.6 0.5" ctrl="7"/>
       <key name="own" qpos="1 0.1 0.2 0.3 0.4 0.5" ctrl="1 2 3 4" act="5"/></keyframe>"""
-    path = written(tmp_path, TOP.format(attach=ATTACH.format(""), key=keys))
-    one = ONE.format(parts=ALL, key=f'<keyframe><key name="{key}" {same}/></keyframe>', **LEGS)
+    path = written(tmp_path, TOP.format(attach=ATTACH.format(which), key="" if which else keys))
+    parts, others = (UPPER, NO_LEGS) if which else (ALL, LEGS)
+    one = ONE.format(parts=parts, key=f'<keyframe><key name="{key}" {same}/></keyframe>', **others)
     (tmp_path / "one.xml").write_text(one)
     found = contents(path, tmp_path / "a", key=key)
     assert_same(found, contents(tmp_path / "one.xml", tmp_path / "b", key=key))

@@ -10,6 +10,7 @@ from dap3d_core.interface.formats import WORLD, FormatError, Source, XmlElement,
 from dap3d_formats.element_table import note_elements
 from dap3d_formats.mjcf.document import Document
 from dap3d_formats.mjcf.elements import CONTACTS, MJCF
+from dap3d_formats.mjcf.keyframes import keys_of_part
 
 #: Elements of all copies of a file beyond which it is refused.
 MOST_COPIES = 100_000
@@ -33,7 +34,7 @@ def read_document(source: Source) -> Document:
     Of an attached model what its world holds, or one body with all below it, is put in a frame in
     the place of <attach>; names get its prefix, and classes and settings of the compiler remain
     those of its file. Its assets follow the own ones, as do tendons, equalities, actuators, pairs
-    and exclusions that name nothing else, and the keyframes of a whole model.
+    and exclusions that name nothing else, and keyframes with the numbers of what is attached.
 
     Raises:
         FormatError: it cannot be read.
@@ -192,15 +193,14 @@ def _part(model: Document, element: XmlElement) -> tuple[list[XmlElement], list[
         what = f"{tag} of <attach>: there is no {tag} {name!r} in model {element.get('model')!r}"
         remedy = f"without {tag} all of the model is attached"
         raise FormatError(f"{what}; it has {known or 'none'}", place, remedy)
-    if root.first("keyframe"):
-        text = f"keyframes of a model of which <attach> takes one {tag}"
-        model.source.remarks.leave_out(place, text)
     sections, names = [], set(_named(XmlElement("", {}, place, [found[name]])))
     for section in (one for tag in NAMING for one in root.all(tag)):
         kept = [child for child in section if names.issuperset(_references(child))]
         names |= {(section.name, child.get("name") or "") for child in kept}
         sections.append(attrs.evolve(section, children=kept))
-    return [found[name]], [*assets, *sections]
+    kept = [one for section in sections if section.name == "actuator" for one in section]
+    keys = keys_of_part(model, found[name], kept)
+    return [found[name]], [*assets, *sections, *keys]
 
 
 def _below(holder: XmlElement, tag: str, childclass: str) -> Iterator[XmlElement]:

@@ -4,6 +4,7 @@ One of an attached model is of what was attached with it; the rest starts where 
 One of a file that attaches others may end before the numbers of these.
 """
 
+from collections.abc import Iterator
 from itertools import accumulate
 from typing import Any
 
@@ -113,3 +114,71 @@ def actuators_of(document: Document) -> list[XmlElement]:
     holders = document.root.all("actuator")
     return [document.settled(one, "main") for holder in holders for one in holder
             if one.name in ACTUATORS]  # fmt: skip
+
+
+def keys_of_part(model: Document, part: XmlElement, acting: list[XmlElement]) -> list[XmlElement]:
+    """The keyframes of a model with the numbers of one body or frame, and of some actuators alone.
+
+    Raises:
+        FormatError: one has more numbers, or fewer where no model is attached to it.
+    """
+    root, document = model.root, XmlElement("body", {}, model.root.place)
+    document.children = [child for world in root.all("worldbody") for child in world]
+    held = list(_held(model, document, part, "main", within=False))
+    joints = [(SIZES.get(kind, (1, 1)), at, inside) for kind, at, inside in held if kind != "mocap"]
+    mocap = [(at, inside) for kind, at, inside in held if kind == "mocap"]
+    motors = [(one, any(one is other for other in acting)) for holder in root.all("actuator")
+              for one in holder if one.name in ACTUATORS]  # fmt: skip
+    states = [(one, kept) for one, kept in motors
+              if model.settled(one, "main").get("dyntype") != "none"]  # fmt: skip
+    parts = {key: [(size[k], at, inside) for size, at, inside in joints]
+             for k, key in enumerate(("qpos", "qvel"))}  # fmt: skip
+    parts |= {key: [(size, *one) for one in mocap] for key, size in (("mpos", 3), ("mquat", 4))}
+    parts |= {key: [(1, one.scope, kept) for one, kept in some]
+              for key, some in (("ctrl", motors), ("act", states))}  # fmt: skip
+    return [
+        attrs.evolve(holder, children=[_part_of_key(model, key, parts) for key in holder])
+        for holder in root.all("keyframe")
+    ]
+
+
+def _part_of_key(
+    model: Document, key: XmlElement, parts: dict[str, list[tuple[int, str, bool]]]
+) -> XmlElement:
+    """A keyframe with a part of its numbers; parts: attribute -> sizes, scopes, what is kept."""
+    attributes = dict(key.attributes)
+    for name in parts.keys() & attributes.keys():
+        mine = [(size, kept) for size, at, kept in parts[name] if at.startswith(key.scope)]
+        words, total = attributes.pop(name).split(), sum(size for size, _ in mine)
+        if len(words) > total or (len(words) < total and len(model.settings) == 1):
+            key.numbers(name, total)
+        held = [kept for size, kept in mine for _ in range(size)]
+        if left := [word for word, kept in zip(words, held, strict=False) if kept]:
+            attributes[name] = " ".join(left)
+    return attrs.evolve(key, attributes=attributes)
+
+
+def _held(
+    model: Document, body: XmlElement, part: XmlElement, childclass: str, *, within: bool
+) -> Iterator[tuple[str, str, bool]]:
+    """Kinds and scopes of joints, and "mocap", in the order of keyframes; whether in a part."""
+    for joints in (True, False):  # those of a body come before those below
+        yield from _held_once(model, body, part, childclass, within, joints)
+
+
+def _held_once(
+    model: Document, holder: XmlElement, part: XmlElement, childclass: str, within: bool,
+    joints: bool,
+) -> Iterator[tuple[str, str, bool]]:  # fmt: skip
+    for child in holder:
+        inner = child.get("childclass") or childclass
+        inside = within or child.children is part.children
+        if child.name == "frame":
+            yield from _held_once(model, child, part, inner, inside, joints)
+        elif joints and child.name in ("joint", "freejoint"):
+            kind = model.settled(child, childclass).get("type") or "hinge"
+            yield "free" if child.name == "freejoint" else kind, child.scope, within
+        elif not joints and child.name == "body":
+            if child.get("mocap") == "true":
+                yield "mocap", child.scope, inside
+            yield from _held(model, child, part, inner, within=inside)
