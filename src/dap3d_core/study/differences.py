@@ -15,7 +15,7 @@ OFFSETS = (-3, -2, -1, 1, 2, 3), (0, 1, 2, 3, 4, 5, 6), (0, -1, -2, -3, -4, -5, 
 CHANGE = 1e-3
 #: Differences of two orders of a smooth function agree to this part, and this of the largest. Else
 #: steps are so much shorter, and tried so often.
-SMOOTH, SMOOTH_OF_LARGEST = 1e-6, 1e-9
+SMOOTH, SMOOTH_OF_LARGEST = 1e-9, 1e-12
 SHORTER, SHORTER_STEPS = 16.0, 4
 
 
@@ -36,7 +36,8 @@ def weights_of(offsets: tuple[int, ...]) -> Floats:
 def slope_at(values: Sequence[Any], offsets: tuple[int, ...], step: float) -> tuple[Any, float]:
     """The derivative at 0 from values at offsets; how far one of a lower order is from it.
 
-    That is above 1 where a corner or a jump of the function lies among the offsets.
+    That is above 1 where a corner or a jump of the function lies among the offsets; infinite where
+    it has no value there (NaN).
     """
     found = weighted(list(zip(weights_of(offsets), values, strict=True))) / step
     kept = [k for k, offset in enumerate(offsets) if abs(offset) < max(map(abs, offsets))]
@@ -45,7 +46,7 @@ def slope_at(values: Sequence[Any], offsets: tuple[int, ...], step: float) -> tu
     size = np.abs(found)
     limit = SMOOTH * size + SMOOTH_OF_LARGEST * np.max(size, initial=0.0)
     parts = np.abs(found - other) / np.where(limit > 0.0, limit, 1.0)
-    return found, float(np.max(parts, initial=0.0))
+    return found, float(np.max(np.where(np.isnan(parts), np.inf, parts), initial=0.0))
 
 
 def best_of(tries: Iterable[tuple[Any, float]]) -> Any:

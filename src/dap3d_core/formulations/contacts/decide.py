@@ -132,10 +132,15 @@ def blame(s: ContactArrays) -> int:
 
 
 @compiled
-def repeat(t: float, s: ContactArrays, system: System, loops: Any, tensions: Any) -> None:
+def repeat(
+    t: float, s: ContactArrays, system: System, loops: Any, functions: Any, tensions: Any
+) -> bool:
     """What is kept as decided once more, at a state nearby: all follows smoothly.
 
-    Shares of what contacts carry stay: where they stick no motion depends on them.
+    Args: as of ``decide``.
+
+    Returns:
+        False where contacts that share what they carry slide, and other ones would here.
     """
     place(t, s.y, system, loops)
     find_grips(t, s, system, tensions)
@@ -152,6 +157,7 @@ def repeat(t: float, s: ContactArrays, system: System, loops: Any, tensions: Any
     change(s, system)
     for k in range(s.moved.shape[0]):
         s.moved[k] = 0.0
+    are_same = not slide_sharing(s) or share_anew(t, s, system, loops, functions, tensions)
     for c in range(s.mode.shape[0]):
         size = size_across(s, c, s.slip[c])
         if s.mode[c] == 1.0 and size > STOPPED * s.length[c]:
@@ -162,6 +168,36 @@ def repeat(t: float, s: ContactArrays, system: System, loops: Any, tensions: Any
                     part = s.length[c] / s.arm[c] * s.slip[c, i] / size
                     s.way[c, k] += part * s.frames[c, i, k]
     put_state(s, system)
+    return are_same
+
+
+@compiled
+def slide_sharing(s: ContactArrays) -> bool:
+    """True if contacts slide that share what they carry: the motion depends on the share."""
+    found = False
+    for c in range(s.mode.shape[0]):
+        for i in range(3):
+            found |= s.mode[c] == 1.0 and s.near[c, i] != 0.0
+    return found
+
+
+@compiled
+def share_anew(
+    t: float, s: ContactArrays, system: System, loops: Any, functions: Any, tensions: Any
+) -> bool:
+    """Divide what contacts carry at the present velocities; False if other modes are found."""
+    s.in_touch_count = 0
+    for c in range(s.mode.shape[0]):
+        s.was[c], s.begins[c], s.leaves[c] = s.mode[c], 0, 0
+        if s.mode[c] > 0.5:
+            s.in_touch[s.in_touch_count] = c
+            s.in_touch_count += 1
+    move_on(t, s, system, loops)
+    find_grips(t, s, system, tensions)
+    are_same = find_modes_now(t, s, system, loops, functions)
+    for c in range(s.mode.shape[0]):
+        are_same &= s.mode[c] == s.was[c]
+    return are_same
 
 
 @compiled

@@ -81,16 +81,18 @@ def find_switch_rates(
     system: Any, loops: Any,
 ) -> None:  # fmt: skip
     """Rates of the switches along the slope, by a difference, from their values in a row."""
-    h, x, s = (
-        max(DIFFERENCE * usual_step(work), LEAST_DIFFERENCE * time_span(work)),
-        work.state[at.OTHER],
-        work.switches,
-    )
+    h, x, s = rate_difference(work), work.state[at.OTHER], work.switches
     for i in range(y.shape[0]):
         x[i] = y[i] + h * slope[i]
     evaluate(work, t + h, x, out, watch, system, loops)
     for k in range(s.shape[1]):
         s[out, k] = (s[out, k] - s[row, k]) / h
+
+
+@compiled
+def rate_difference(work: IntegrationState) -> float:
+    """The time, s, over which rates are found by differences."""
+    return max(DIFFERENCE * usual_step(work), LEAST_DIFFERENCE * time_span(work))
 
 
 @compiled

@@ -135,19 +135,9 @@ class ContactJumps(Jumps):
         self._resolve(integration, TOUCHING * table.length, ended)
 
     def repeat_of(self, other: Jumps) -> None:
-        """Decide what another decided at its last instant, at states nearby.
-
-        Raises:
-            SimulationError: contacts that share what they carry slide.
-        """
+        """Decide what another decided at its last instant, at states nearby."""
         assert isinstance(other, ContactJumps)
         s, of = self.arrays, other.arrays
-        sharing = np.flatnonzero((of.mode == 1.0) & of.near.any(axis=1))
-        if shares := [self.table.names[c] for c in sharing]:
-            raise SimulationError(
-                f"contacts {', '.join(shares)} share what they carry, and slide: what each of them "
-                "takes is a choice, of which derivatives are not known; let fewer points touch"
-            )
         for name in DECIDED:
             getattr(s, name)[:] = getattr(of, name)
         s.round_count, self.repeats = of.round_count, True
@@ -298,7 +288,12 @@ class ContactJumps(Jumps):
         s.limit[:], s.ended[:] = touching, ended
         given = t, s, evaluator.system, evaluator.loops
         if self.repeats:
-            repeat(*given, table.tensions)
+            sharing = [table.names[c] for c in np.flatnonzero(s.near.any(axis=1))]
+            if not repeat(*given, evaluator.functions, table.tensions):
+                raise SimulationError(
+                    f"contacts {', '.join(sharing)} share what they carry, and others of them "
+                    "slide with values nearby; let fewer points touch"
+                )
             self._take_decided(integration, float(np.sum(s.work)))
             return
         if failure := decide(*given, evaluator.functions, table.tensions):

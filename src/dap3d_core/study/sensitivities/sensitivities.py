@@ -453,12 +453,20 @@ class DifferentiatedRun(Run):
                 jumps = type(of)(run.evaluator)
                 jumps.span = of.span
                 jumps.repeat_of(of)
-                change(jumps, run.present)
+                try:
+                    change(jumps, run.present)
+                except SimulationError as error:  # shorter differences may not come to that
+                    failures.append(error)
+                    return np.full_like(own.state[Y], np.nan)
                 return own.state[Y].copy()
 
+            failures: list[SimulationError] = []
             change(of, integration)
             motion = slice(0, -2)  # without the work done and time
             slopes = self._derivative(after, given, np.vstack([of_state, of_time]), motion)
+            if np.isnan(slopes).any():
+                what = f"there is no derivative of what happens at t = {work.t:.9g} s"
+                raise SimulationError(f"{what}: {failures[-1]}") from failures[-1]
             self.instants[float(work.t)] = of_time
             self._differentiation.take()
             self._slopes_of(work.state)[: work.state.shape[1]] = slopes
