@@ -46,13 +46,15 @@ WAYS = {
     ],
 )
 def test_a_given_moment_or_force(way, kind, field, name, inertia):
-    """Inertia times rate is the integral of the moment over time; steps leave 1e-9."""
+    """Inertia times rate is the integral of the moment over time; steps leave 1e-9. Without a limit
+    a law has no branches, of which a note would tell."""
     value, impulse = WAYS[way]
     scene = machine(kind)
     scene.add_force("motor", "motor", joint="guide", **{field: value})
     result = dap.simulate(scene, t_end=1.0, dt=0.25, rtol=1e-9, atol=1e-11)
     rate = coordinate(result, name)[1]
     np.testing.assert_allclose(rate, impulse(result.t) / inertia, atol=1e-7)
+    assert not any("branches" in note for note in result.notes)
 
 
 PLACES = {"number": (13.0, 0.0), "function": ("ramp", 2.0), "input": ("signal", 0.0)}
@@ -71,6 +73,7 @@ def test_a_position_is_sought(way, kind, name, inertia):
     t = result.t
     error = (place + (rate + 5.0 * place) * t) * np.exp(-5.0 * t)  # at rest at the start
     np.testing.assert_allclose(coordinate(result, name)[0], place + rate * t - error, atol=1e-7)
+    assert not any("branches" in note for note in result.notes)
 
 
 @pytest.mark.parametrize(("kind", "name"), [("rev", "angle"), ("tran", "length")])
@@ -104,6 +107,7 @@ def test_a_position_is_sought_within_a_limit():
     after = 1.5 - 0.5 * np.cos(omega * s) + rate / omega * np.sin(omega * s)
     expected = np.where(s < 0.0, limit / J * result.t**2 / 2.0, after)
     np.testing.assert_allclose(coordinate(result)[0], expected, atol=1e-6)  # a corner in a step
+    assert any("branches" in note for note in result.notes)
 
 
 def test_the_position_of_a_motor_is_an_input_of_a_linear_model():
