@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import dap3d_core as dap
+from dap3d_core.result import UnknownNameError
 
 J, M = 0.2, 2.0
 
@@ -226,6 +227,28 @@ def test_an_input_is_set_in_a_run():
         run.step(0.5)
         run.step(0.5, inputs={"signal": -2.0})
         assert run.state["guide.angle_rate"] == pytest.approx(rate, abs=1e-9)
+
+
+@pytest.mark.parametrize(("kind", "name"), [("rev", "angle"), ("tran", "length")])
+def test_a_position_that_is_set_is_an_input_of_a_linear_model(kind, name):
+    """G = 1 / (lag s + 1)^2 of the coordinate, s^2 times the inertia of what moves it; a speed that
+    is set is none."""
+    scene, lag = machine(kind), 0.1
+    scene.inputs["signal"].value = 0.0
+    scene.add_joint("motor", "motor", joint="guide", position="signal", lag=lag)
+    moved = {"rev": "motor.moment.x", "tran": "motor.force.x"}[kind]
+    outputs = (f"guide.{name}", moved, "signal")
+    found = dap.linearize(scene, inputs=("signal",), outputs=outputs)
+    s, states = 3.0j, len(found.A)
+    G = found.C @ np.linalg.solve(s * np.eye(states) - found.A, found.B) + found.D
+    follows = 1.0 / (lag * s + 1.0) ** 2
+    inertia = {"rev": J, "tran": M}[kind]
+    np.testing.assert_allclose(G[:, 0], [follows, inertia * s**2 * follows, 1.0], atol=1e-8)
+    scene.joints["motor"].fields = {"joint": "guide", "speed": "signal"}
+    with pytest.raises(
+        dap.UnknownNameError, match="Drive motor by a function of time in its place"
+    ):
+        dap.linearize(scene, inputs=("signal",), outputs=outputs)
 
 
 def test_a_linear_model_has_the_moment_as_an_input():

@@ -28,7 +28,8 @@ class DriverRows:
     """Derivatives of right-hand sides of rows by drivers, (rows, drivers) each.
 
     Attributes:
-        nu: by displacement, rate; gamma: by displacement, rate, acceleration.
+        nu: by displacement, rate; gamma: by displacement, rate, acceleration. The last has columns
+            of numbers that rows read as well, without displacements, behind those of drivers.
     """
 
     nu: tuple[Floats, Floats]
@@ -47,7 +48,8 @@ class StateSpace:
         own: (states, s) unit columns of the states of elements among all.
         acceleration_by_force: (6 n, 6 n), multipliers_by_force: (rows, 6 n).
         driver_input: (states, drivers), acceleration_by_driver: (6 n, drivers),
-            multipliers_by_driver: (rows, drivers): by accelerations of drivers.
+            multipliers_by_driver: (rows, drivers): by accelerations of drivers, and by the numbers
+            behind them.
         coordinate_count: number of xi and w.
         size: magnitude of the terms that A is made of, 1/s: its rounding errors are eps of it.
     """
@@ -104,7 +106,7 @@ def state_space(
     solve = _Accelerations(equations, rows)
     v_dot, lam = solve(_placed(own.force, last, x.shape[1]) - (K @ x + C @ v), -by_motion)
     by_force, lam_by_force = solve(U.T, np.zeros((len(D), len(U))))
-    by_driver, lam_by_driver = solve(np.zeros((len(U), count)), gamma[2])
+    by_driver, lam_by_driver = solve(np.zeros((len(U), gamma[2].shape[1])), gamma[2])
     rate = np.zeros((count, x.shape[1]))
     rate[:, last - count : last] = np.eye(count)
     above = np.zeros((Q.shape[1] + count, len(U)))
@@ -120,7 +122,12 @@ def state_space(
         acceleration_by_force=U @ by_force,
         multipliers_by_force=lam_by_force / back,
         driver_input=np.vstack(
-            [above @ by_driver, N.T @ by_driver, np.eye(count), below[count:] @ by_driver]
+            [
+                above @ by_driver,
+                N.T @ by_driver,
+                np.eye(count, by_driver.shape[1]),
+                below[count:] @ by_driver,
+            ]
         ),
         acceleration_by_driver=U @ by_driver,
         multipliers_by_driver=lam_by_driver / back,
