@@ -245,9 +245,7 @@ def test_a_position_that_is_set_is_an_input_of_a_linear_model(kind, name):
     inertia = {"rev": J, "tran": M}[kind]
     np.testing.assert_allclose(G[:, 0], [follows, inertia * s**2 * follows, 1.0], atol=1e-8)
     scene.joints["motor"].fields = {"joint": "guide", "speed": "signal"}
-    with pytest.raises(
-        dap.UnknownNameError, match="Drive motor by a function of time in its place"
-    ):
+    with pytest.raises(UnknownNameError, match="Drive motor by a function of time in its place"):
         dap.linearize(scene, inputs=("signal",), outputs=outputs)
 
 
