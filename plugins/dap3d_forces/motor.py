@@ -107,12 +107,16 @@ class Motor(CoordinateFields, Force):
 class Unlimited(Motor, force=False, speed=False, position=False, limit=False):
     """It turns about its axis, whatever the moment."""
 
+    actuates = "torque"
+
     def wrench(a_j, torque):
         return pair(torque, a_j)
 
 
 class UnlimitedPushing(Motor, force=True, speed=False, position=False, limit=False):
     """It pushes along its axis, whatever the force."""
+
+    actuates = "force"
 
     def wrench(a_j, s_P_i, r_P_i, r_j, force):
         return pull(-force, a_j, s_P_i, r_P_i, r_j)

@@ -257,6 +257,22 @@ def test_a_linear_model_has_the_moment_as_an_input():
     assert np.max(np.abs(linear.B)) == pytest.approx(J**-0.5, rel=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("kind", "field", "name", "inertia"),
+    [("rev", "torque", "angle", J), ("tran", "force", "length", M)],
+)
+def test_inverse_dynamics_finds_what_a_motor_gives(kind, field, name, inertia):
+    """Inertia times acceleration, of 0.5 sin 2 t; what a function gives is not found."""
+    scene, t = machine(kind), np.linspace(0.0, 1.0, 201)
+    scene.add_force("motor", "motor", joint="guide", **{field: 3.0})
+    motion = {"t": t, f"guide.{name}": 0.5 * np.sin(2.0 * t)}
+    found = dap.inverse(scene, motion, "motor").record.actuation["motor"]
+    np.testing.assert_allclose(found, -2.0 * inertia * np.sin(2.0 * t), atol=1e-6)  # a spline's
+    scene.forces["motor"].fields[field] = "ramp"
+    with pytest.raises(dap.SceneError, match=f"its {field} is that of ramp"):
+        dap.inverse(scene, motion, "motor")
+
+
 def test_the_ledger_has_the_work_of_a_motor():
     """A speed that is a number does work against gravity: the energy is no constant."""
     scene = machine()
