@@ -111,6 +111,7 @@ def state_space(
     rate[:, last - count : last] = np.eye(count)
     above = np.zeros((Q.shape[1] + count, len(U)))
     below = np.zeros((count + own.count, len(U)))
+    steered = _placed(np.eye(len(below), count), 0, by_driver.shape[1])
     return StateSpace(
         A=np.vstack([Q.T @ (v + S @ x), rate, N.T @ v_dot, 0.0 * rate, own.rates(x, v)]),
         own=np.eye(x.shape[1])[:, last:],
@@ -121,14 +122,7 @@ def state_space(
         force_input=np.vstack([above, N.T @ by_force, below]),
         acceleration_by_force=U @ by_force,
         multipliers_by_force=lam_by_force / back,
-        driver_input=np.vstack(
-            [
-                above @ by_driver,
-                N.T @ by_driver,
-                np.eye(count, by_driver.shape[1]),
-                below[count:] @ by_driver,
-            ]
-        ),
+        driver_input=np.vstack([above @ by_driver, N.T @ by_driver, steered]),
         acceleration_by_driver=U @ by_driver,
         multipliers_by_driver=lam_by_driver / back,
         coordinate_count=Q.shape[1] + count,
