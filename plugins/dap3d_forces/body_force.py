@@ -51,8 +51,16 @@ class OfTime(BodyForce, function=True):
         return ((F, cross(s_P_i, F)),)
 
 
-class Actuated(BodyForce, input=True):
+class Unbounded(BodyForce, input=True, input_min=False, input_max=False):
     """The force times an input."""
+
+    def wrench(A_i, fp, input, s_P_i):
+        F = rotate(A_i, scale(input, fp))
+        return ((F, cross(s_P_i, F)),)
+
+
+class Actuated(BodyForce, input=True):
+    """The force times an input within its bounds."""
 
     def wrench(A_i, fp, input, input_min, input_max, s_P_i):
         F = rotate(A_i, scale(within(input, input_min, input_max), fp))

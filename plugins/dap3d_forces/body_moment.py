@@ -38,8 +38,15 @@ class OfTime(BodyMoment, function=True):
         return ((ZERO, rotate(A_i, scale(f, np))),)
 
 
-class Actuated(BodyMoment, input=True):
+class Unbounded(BodyMoment, input=True, input_min=False, input_max=False):
     """The moment times an input."""
+
+    def wrench(A_i, np, input):
+        return ((ZERO, rotate(A_i, scale(input, np))),)
+
+
+class Actuated(BodyMoment, input=True):
+    """The moment times an input within its bounds."""
 
     def wrench(A_i, np, input, input_min, input_max):
         return ((ZERO, rotate(A_i, scale(within(input, input_min, input_max), np))),)

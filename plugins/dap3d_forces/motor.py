@@ -11,9 +11,6 @@ from dap3d_joints.motor import CoordinateFields
 
 interface_version = 1
 
-#: A limit that is none.
-UNLIMITED = 1e100
-
 
 class Motor(CoordinateFields, Force):
     """A moment or force in the coordinate of a joint, given, or as a speed or position takes it.
@@ -100,12 +97,29 @@ class Motor(CoordinateFields, Force):
         i, j = bodies["i"], bodies["j"]
         n, _ = normals(self.a_j)
         x_0 = dot(j.to_global(self.a_j), sub(i.place(self.P_i), j.place(self.P_j)))
-        limit = UNLIMITED if self.limit is None else self.limit
-        numbers = {"k": self.k or 0.0, "limit": limit, "x_0": x_0}
+        numbers = {"k": self.k or 0.0, "limit": self.limit or 0.0, "x_0": x_0}
         return numbers | {"n_j": n, "u_i": i.to_local(j.to_global(n))}
 
     def wrench(a_j, torque, limit):
         return pair(saturated(torque, limit), a_j)
+
+
+class Unlimited(Motor, force=False, speed=False, position=False, limit=False):
+    """It turns about its axis, whatever the moment."""
+
+    actuates = "torque"
+
+    def wrench(a_j, torque):
+        return pair(torque, a_j)
+
+
+class UnlimitedPushing(Motor, force=True, speed=False, position=False, limit=False):
+    """It pushes along its axis, whatever the force."""
+
+    actuates = "force"
+
+    def wrench(a_j, s_P_i, r_P_i, r_j, force):
+        return pull(-force, a_j, s_P_i, r_P_i, r_j)
 
 
 class Pushing(Motor, force=True, speed=False, position=False):
@@ -131,6 +145,17 @@ class TurningAt(Motor, force=False, speed=True, position=False):
         return pair(limit * tanh(error / tolerance), a_j)
 
 
+class UnlimitedPushingTo(
+    Motor, force=False, speed=False, position=True, coordinate="length", limit=False
+):
+    """It seeks a position along its axis, whatever the force."""
+
+    def wrench(a_j, s_P_i, r_P_i, r_P_j, v_P_i, v_P_j, r_j, w_j, x_0, position, position_dot, k, c):
+        x, rate = along(a_j, r_P_i, r_P_j, v_P_i, v_P_j, w_j)
+        F = k * (position - (x - x_0)) + c * (position_dot - rate)
+        return pull(-F, a_j, s_P_i, r_P_i, r_j)
+
+
 class PushingTo(Motor, force=False, speed=False, position=True, coordinate="length"):
     """It seeks a position along its axis."""
 
@@ -142,10 +167,17 @@ class PushingTo(Motor, force=False, speed=False, position=True, coordinate="leng
         return pull(-F, a_j, s_P_i, r_P_i, r_j)
 
 
-class TurningTo(Motor, force=False, speed=False, position=True):
-    """It seeks an angle, of which it counts turns."""
+class UnlimitedTurningTo(Motor, force=False, speed=False, position=True, limit=False):
+    """It seeks an angle, of which it counts turns, whatever the moment."""
 
     theta: float = angle("n_j", "u_i", "a_j")
+
+    def wrench(a_j, theta, theta_dot, position, position_dot, k, c):
+        return pair(k * (position - theta) + c * (position_dot - theta_dot), a_j)
+
+
+class TurningTo(UnlimitedTurningTo, force=False, speed=False, position=True):
+    """It seeks an angle, of which it counts turns."""
 
     def wrench(a_j, theta, theta_dot, position, position_dot, k, c, limit):
         return pair(saturated(k * (position - theta) + c * (position_dot - theta_dot), limit), a_j)

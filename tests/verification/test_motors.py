@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import dap3d_core as dap
+from dap3d_core.result import UnknownNameError
 
 J, M = 0.2, 2.0
 
@@ -46,13 +47,15 @@ WAYS = {
     ],
 )
 def test_a_given_moment_or_force(way, kind, field, name, inertia):
-    """Inertia times rate is the integral of the moment over time; steps leave 1e-9."""
+    """Inertia times rate is the integral of the moment over time; steps leave 1e-9. Without a limit
+    a law has no branches, of which a note would tell."""
     value, impulse = WAYS[way]
     scene = machine(kind)
     scene.add_force("motor", "motor", joint="guide", **{field: value})
     result = dap.simulate(scene, t_end=1.0, dt=0.25, rtol=1e-9, atol=1e-11)
     rate = coordinate(result, name)[1]
     np.testing.assert_allclose(rate, impulse(result.t) / inertia, atol=1e-7)
+    assert not any("branches" in note for note in result.notes)
 
 
 PLACES = {"number": (13.0, 0.0), "function": ("ramp", 2.0), "input": ("signal", 0.0)}
@@ -71,6 +74,7 @@ def test_a_position_is_sought(way, kind, name, inertia):
     t = result.t
     error = (place + (rate + 5.0 * place) * t) * np.exp(-5.0 * t)  # at rest at the start
     np.testing.assert_allclose(coordinate(result, name)[0], place + rate * t - error, atol=1e-7)
+    assert not any("branches" in note for note in result.notes)
 
 
 @pytest.mark.parametrize(("kind", "name"), [("rev", "angle"), ("tran", "length")])
@@ -104,6 +108,7 @@ def test_a_position_is_sought_within_a_limit():
     after = 1.5 - 0.5 * np.cos(omega * s) + rate / omega * np.sin(omega * s)
     expected = np.where(s < 0.0, limit / J * result.t**2 / 2.0, after)
     np.testing.assert_allclose(coordinate(result)[0], expected, atol=1e-6)  # a corner in a step
+    assert any("branches" in note for note in result.notes)
 
 
 def test_the_position_of_a_motor_is_an_input_of_a_linear_model():
@@ -224,12 +229,48 @@ def test_an_input_is_set_in_a_run():
         assert run.state["guide.angle_rate"] == pytest.approx(rate, abs=1e-9)
 
 
+@pytest.mark.parametrize(("kind", "name"), [("rev", "angle"), ("tran", "length")])
+def test_a_position_that_is_set_is_an_input_of_a_linear_model(kind, name):
+    """G = 1 / (lag s + 1)^2 of the coordinate, s^2 times the inertia of what moves it; a speed that
+    is set is none."""
+    scene, lag = machine(kind), 0.1
+    scene.inputs["signal"].value = 0.0
+    scene.add_joint("motor", "motor", joint="guide", position="signal", lag=lag)
+    moved = {"rev": "motor.moment.x", "tran": "motor.force.x"}[kind]
+    outputs = (f"guide.{name}", moved, "signal")
+    found = dap.linearize(scene, inputs=("signal",), outputs=outputs)
+    s, states = 3.0j, len(found.A)
+    G = found.C @ np.linalg.solve(s * np.eye(states) - found.A, found.B) + found.D
+    follows = 1.0 / (lag * s + 1.0) ** 2
+    inertia = {"rev": J, "tran": M}[kind]
+    np.testing.assert_allclose(G[:, 0], [follows, inertia * s**2 * follows, 1.0], atol=1e-8)
+    scene.joints["motor"].fields = {"joint": "guide", "speed": "signal"}
+    with pytest.raises(UnknownNameError, match="Drive motor by a function of time in its place"):
+        dap.linearize(scene, inputs=("signal",), outputs=outputs)
+
+
 def test_a_linear_model_has_the_moment_as_an_input():
     """sqrt(J) theta_ddot = u / sqrt(J), in coordinates of unit mass."""
     scene = machine()
     scene.add_force("motor", "motor", joint="guide", torque="signal", limit=10.0)
     linear = dap.linearize(scene, inputs=("signal",))
     assert np.max(np.abs(linear.B)) == pytest.approx(J**-0.5, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kind", "field", "name", "inertia"),
+    [("rev", "torque", "angle", J), ("tran", "force", "length", M)],
+)
+def test_inverse_dynamics_finds_what_a_motor_gives(kind, field, name, inertia):
+    """Inertia times acceleration, of 0.5 sin 2 t; what a function gives is not found."""
+    scene, t = machine(kind), np.linspace(0.0, 1.0, 201)
+    scene.add_force("motor", "motor", joint="guide", **{field: 3.0})
+    motion = {"t": t, f"guide.{name}": 0.5 * np.sin(2.0 * t)}
+    found = dap.inverse(scene, motion, "motor").record.actuation["motor"]
+    np.testing.assert_allclose(found, -2.0 * inertia * np.sin(2.0 * t), atol=1e-6)  # a spline's
+    scene.forces["motor"].fields[field] = "ramp"
+    with pytest.raises(dap.SceneError, match=f"its {field} is that of ramp"):
+        dap.inverse(scene, motion, "motor")
 
 
 def test_the_ledger_has_the_work_of_a_motor():

@@ -83,10 +83,10 @@ def did_you_mean(
     return form.format(f"did you mean {near!r}?") if near else otherwise
 
 
-def some(names: Sequence[str], most: int) -> str:
+def some(names: Sequence[str], most: int, between: str = ", ") -> str:
     """The first of several names, and the number of the others."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
+    return between.join(names[:most]) + more
 
 
 @lru_cache(maxsize=4)

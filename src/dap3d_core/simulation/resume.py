@@ -244,11 +244,15 @@ class ResumedRun:
             states is not None and not np.isfinite(states).all()
         ):
             raise self._damaged("the states of elements at its start are of another model")
+        ended = self._found.header.get("start_without", [])
+        if not are_texts(ended) or not set(ended) <= set(model.breaks):
+            raise self._damaged("the joints that do not hold at its start are of another model")
         return StartState(
             u,
             angles,
             is_interpolated=self._found.header.get("start_is_interpolated") is True,
             states=states,
+            ended=tuple(ended),
         )
 
     def _restore(self, run: RunState) -> None:

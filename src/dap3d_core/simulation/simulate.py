@@ -89,4 +89,4 @@ def given_state(start: "Start | None", compiled: CompiledModel) -> "StartState |
         return None
     from dap3d_core.simulation.initial.start_state import start_state
 
-    return start_state(start, compiled.model, compiled.checked.registry)
+    return start_state(start, compiled.model, compiled.checked)

@@ -21,6 +21,8 @@ from dap3d_core.scene.validate.mistake_collector import Collector
 
 #: Tables whose parts have quantities: an output has another name.
 OWNERS = ("bodies", "points", "joints", "forces", "inputs")
+#: Names that begin those of quantities of the whole scene.
+OF_SCENE = ("t", "energy", "work", "constraint", "ground", "animation")
 #: Names of dimensions and variables of every data set.
 DIMENSIONS = ("time", "point", "axis", "euler", "status", "note")
 #: Keys of an output that is a table; longest text of a unit.
@@ -96,6 +98,23 @@ def fault_of_quantity(scene: SceneTables, name: Any, but: str = "") -> str:
     tables = (table for table in OWNERS if table != but)
     table = next((table for table in tables if name in getattr(scene, table)), None)
     return f"there is one of this name in {table} already" if table else ""
+
+
+def report_unknown(report: Collector, outputs: Mapping[str, Expression]) -> None:
+    """Report the quantities in outputs that begin with no name of the scene.
+
+    The limits of a joint have its name and more behind ``_``, points of a contact behind ``#``.
+    """
+    scene = report.scene
+    tables = (*OWNERS, "contacts", "shapes", "outputs")
+    known = {*OF_SCENE, *(str(name) for table in tables for name in getattr(scene, table))}
+    known |= {str(key[1]) for key, _ in scene.faults if len(key) > 1}  # not read
+    for name, expression in outputs.items():
+        for quantity in expression.names:
+            if not any(f"{quantity}.".startswith((f"{n}.", f"{n}_", f"{n}#")) for n in known):
+                head = quantity.partition(".")[0]
+                what = f"there is no body, point, joint, contact, force or output {head!r}"
+                report.add(("outputs", name), expression.text, what, report.nearest(head, known))
 
 
 def _in_order(report: Collector, expressions: Mapping[str, Expression]) -> dict[str, Expression]:

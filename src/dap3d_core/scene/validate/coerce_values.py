@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping
 from typing import Any, NamedTuple
 
 from dap3d_core.interface.fields import FieldSpec
-from dap3d_core.registry.suggestions import nearest
+from dap3d_core.registry.suggestions import nearest, some
 from dap3d_core.scene.coerce import plain
 
 #: Beyond this size products of two numbers leave double precision.
@@ -24,6 +24,8 @@ UNIT_TOLERANCE = 1e-6
 UNIT_LENGTH_ROUNDING = 1e-9
 #: A shorter vector has no direction.
 SHORTEST = 1e-12
+#: Entries of a list that a message tells the faults of.
+MOST_FAULTS = 4
 #: An angle beyond a full turn is probably given in degrees.
 TURN = 6.283185307179586
 
@@ -103,18 +105,17 @@ def numbers_of(value: Any, count: int) -> Any:
     if len(value) != count:
         hint = "write one row only" if value and type(value[0]) is tuple else ""
         return Fault(f"{should}; it has {len(value)}", hint)
-    return _entries(value, number_of, f"{should}; entry")
+    return _entries(value, number_of, should, "entry")
 
 
-def _entries(value: tuple[Any, ...], reader: Callable[[Any], Any], should: str) -> Any:
-    """The entries of a list, each read; the fault of the first invalid one."""
-    entries = []
-    for k, item in enumerate(value, 1):
-        entry = reader(item)
-        if isinstance(entry, Fault):
-            return Fault(f"{should} {k} {entry.what}", entry.remedy)
-        entries.append(entry)
-    return tuple(entries)
+def _entries(value: tuple[Any, ...], reader: Callable[[Any], Any], should: str, noun: str) -> Any:
+    """The entries of a list, each read; the faults of the invalid ones, with the first remedy."""
+    entries = tuple(map(reader, value))
+    faults = [(k, entry) for k, entry in enumerate(entries, 1) if isinstance(entry, Fault)]
+    if not faults:
+        return entries
+    told = some([f"{noun} {k} {fault.what}" for k, fault in faults], MOST_FAULTS, "; ")
+    return Fault(f"{should}; {told}", faults[0][1].remedy)
 
 
 def points_of(value: Any) -> Any:
@@ -122,7 +123,7 @@ def points_of(value: Any) -> Any:
     value, should = plain(value), "should be a list of two or more points of 3 numbers each"
     if type(value) is not tuple or len(value) < 2:
         return Fault(should)
-    return _entries(value, lambda point: numbers_of(point, 3), f"{should}; point")
+    return _entries(value, lambda point: numbers_of(point, 3), should, "point")
 
 
 def quaternion_of(value: Any) -> Any:
@@ -190,7 +191,7 @@ def matrix_of(value: Any) -> Any:
         return Fault(f"{should}; it is one list of 9", "write [[..., ..., ...], [...], [...]]")
     if len(value) != 3:
         return Fault(f"{should}; it has {len(value)} entries")
-    return _entries(value, lambda row: numbers_of(row, 3), f"{should}; row")
+    return _entries(value, lambda row: numbers_of(row, 3), should, "row")
 
 
 def square_of(value: Any, size: int) -> Any:
@@ -201,7 +202,7 @@ def square_of(value: Any, size: int) -> Any:
     should = f"should be {size} numbers, or {size} rows of {size}"
     if len(value) != size:
         return Fault(f"{should}; it has {len(value)} rows")
-    rows = _entries(value, lambda row: numbers_of(row, size), f"{should}; row")
+    rows = _entries(value, lambda row: numbers_of(row, size), should, "row")
     if isinstance(rows, Fault):
         return rows
     largest = max(abs(x) for row in rows for x in row)
@@ -234,7 +235,7 @@ def rows_of(value: Any) -> Any:
     value, should = plain(value), "should be a list of rows of numbers"
     if type(value) is not tuple or not value:
         return Fault(f"{should}, not {_kind(value)}")
-    rows = _entries(value, list_of, f"{should}; row")
+    rows = _entries(value, list_of, should, "row")
     if isinstance(rows, Fault):
         return rows
     for k, row in enumerate(rows, 1):

@@ -223,9 +223,11 @@ def _check_shapes_and_outputs(
 
         shapes = read_shapes(report, bodies.body_index)
     if report.scene.outputs:
-        from dap3d_core.scene.expressions.outputs import read_outputs
+        from dap3d_core.scene.expressions.outputs import read_outputs, report_unknown
 
-        read_outputs(report)
+        outputs = read_outputs(report)
+        if report.mistakes or report.scene.faults:  # else the model says what there is
+            report_unknown(report, outputs)
     if report.scene.collisions is None and not any(s.values.get("collides") for s in shapes):
         return None
     from dap3d_core.scene.contacts.read_contacts import read_collisions

@@ -329,6 +329,7 @@ def checkpoint_of(run: RunState) -> Checkpoint:
         "settings": attrs.asdict(run.settings),
         "estimate_error": run.estimate_error is True,
         "start_is_interpolated": run.start is not None and run.start.is_interpolated,
+        "start_without": [] if run.start is None else list(run.start.ended),
         "notes": run.notes,
         "wall_time_s": time.perf_counter() - run.started,
         "compile_time_s": run.compile_time,

@@ -172,9 +172,7 @@ def equilibrium(
     """
     compiled = compiled_for(scene, allow_code, announce, integrator="auto")
     settings = compiled.scene.simulation
-    state = None
-    if start is not None:
-        state = start_state(start, compiled.model, compiled.checked.registry)
+    state = None if start is None else start_state(start, compiled.model, compiled.checked)
     brought = compiled.model.brought_forces.values()
     if reading := [name for group in compiled.model.forces if group.read
                    for k in group.members.tolist()

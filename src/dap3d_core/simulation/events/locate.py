@@ -210,8 +210,12 @@ class EventLocator:
             self.begin_anew(integration)
 
     def release_inactive(self, start: "StartState | None") -> None:
-        """End the joints that are not active where a run starts: None for the scene's start."""
+        """End the joints that do not hold where a run starts: None for the scene's start."""
         model, compiled = self.compiled.model, self.compiled
+        if self.released is not None and start is not None:
+            begin = tuple(start.u.tolist())
+            self.occurrences += [EventRecord(name=name, t=0.0, direction=0, kind="break", u=begin)
+                                 for name in self.released.release(start.ended)]  # fmt: skip
         if self.released is not None and model.active:
             from dap3d_core.simulation.output.check_outputs import inactive_joints
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from numbers import Real
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import attrs
 import numpy as np
@@ -15,12 +15,9 @@ from dap3d_core.model.rotations import angular_velocities, euler_rates
 from dap3d_core.model.state_layout import join, split
 from dap3d_core.registry.suggestions import nearest, some
 from dap3d_core.result import Result, information
-from dap3d_core.scene import Mistake, SceneError, parse
+from dap3d_core.scene import Mistake, Scene, SceneError, ValidatedScene, parse
 from dap3d_core.scene import check as validate
-
-if TYPE_CHECKING:
-    from dap3d_core.registry import Registry
-
+from dap3d_core.scene.errors import shown
 
 #: A time is a reported one if it differs from it by this part of the result's span.
 SAME_TIME = 1e-12
@@ -39,6 +36,7 @@ class StartState:
         notes: where it comes from.
         is_interpolated: it is near the constraints, and has to be brought onto them.
         states: (s,) states of elements, in the order of the model; None for their initial values.
+        ended: joints that hold no more, of those that may break.
     """
 
     u: Floats
@@ -46,6 +44,7 @@ class StartState:
     notes: tuple[str, ...] = ()
     is_interpolated: bool = False
     states: Floats | None = None
+    ended: tuple[str, ...] = ()
 
 
 @attrs.frozen(eq=False)
@@ -57,8 +56,9 @@ class NamedState:
         body_names: (n,) in the order of the state.
         u: (13 n,) the state.
         angles: name (``Model.angle_names``) -> angle whose turns are counted, rad.
-        notes, is_interpolated: as of ``StartState``.
+        notes, is_interpolated, ended: as of ``StartState``.
         states: name (``ModelSummary.state_names``) -> state of an element.
+        given: input, or force.field -> value that a script had given it.
     """
 
     title: str
@@ -68,6 +68,8 @@ class NamedState:
     notes: tuple[str, ...] = ()
     is_interpolated: bool = False
     states: Mapping[str, float] = attrs.field(factory=dict)
+    ended: tuple[str, ...] = ()
+    given: Mapping[str, Any] = attrs.field(factory=dict)
 
 
 class HasNamedState(Protocol):
@@ -83,13 +85,12 @@ class HasNamedState(Protocol):
 Start = str | Result | tuple[Result, float | None] | HasNamedState | StartState
 
 
-def start_state(start: Any, model: Model, registry: "Registry") -> StartState:
+def start_state(start: Any, model: Model, checked: ValidatedScene) -> StartState:
     """The state that a start means for a model whose bodies have the same names.
 
     Args:
         start: a result, a result and a time, an equilibrium, or a state of the model.
-        model: what is to start.
-        registry: source of the types of a result's scene, for its turns of angles.
+        model, checked: what is to start.
 
     Raises:
         SceneError: it is nothing of these, a body is missing in it, the result is empty, or has no
@@ -101,7 +102,7 @@ def start_state(start: Any, model: Model, registry: "Registry") -> StartState:
         start = start, None
     named: Any
     if isinstance(start, tuple) and len(start) == 2 and isinstance(start[0], Result):
-        named = _state_of_result(*start, registry, with_angles=model.angle_count > 0)
+        named = _state_of_result(*start, model, checked)
     else:
         named = getattr(start, "state", None)
     if not isinstance(named, NamedState):
@@ -109,14 +110,14 @@ def start_state(start: Any, model: Model, registry: "Registry") -> StartState:
             type(start).__name__,
             'should be a result, (result, time), an equilibrium, "scene" or "equilibrium"',
         )
-    return _matched(named, model)
+    return _matched(named, model, checked.scene)
 
 
 def _mistake(value: Any, what: str) -> SceneError:
     return SceneError([Mistake("start", value, what)])
 
 
-def _matched(named: NamedState, model: Model) -> StartState:
+def _matched(named: NamedState, model: Model, scene: Scene) -> StartState:
     """The state of the model's bodies."""
     place = {body: k for k, body in enumerate(named.body_names)}
     missing = [body for body in model.body_names if body not in place]
@@ -152,12 +153,42 @@ def _matched(named: NamedState, model: Model) -> StartState:
         notes.append(f"states begin with their initial values, for the start has none of {listed}")
     given = zip(labels, model.initial_states.tolist(), strict=True)
     states = np.array([named.states.get(n, value) for n, value in given]) if labels else None
-    return StartState(u, angles, tuple(notes), named.is_interpolated, states)
+    notes += _numbers_notes(named, model, scene)
+    return StartState(u, angles, tuple(notes), named.is_interpolated, states, _ended(named, model))
 
 
-def _state_of_result(
-    result: Result, t: Any, registry: "Registry", *, with_angles: bool
-) -> NamedState:
+def _numbers_notes(named: NamedState, model: Model, scene: Scene) -> list[str]:
+    """That the run does not begin with the inputs and numbers of forces that a script had set."""
+    own: dict[str, Any] = dict(zip(model.input_names, model.input_values.tolist(), strict=True))
+    for name in named.given:
+        force, _, field = name.rpartition(".")
+        if force in scene.forces:
+            own[name] = scene.forces[force].fields.get(field)
+    others = [f"{name} ({shown(value)}, here {shown(own[name])})"
+              for name, value in named.given.items()
+              if name in own and not np.array_equal(value, own[name])]  # fmt: skip
+    if not others:
+        return []
+    return [
+        "the run begins with the inputs and numbers of forces of the scene; where it starts, "
+        f"scripts had given {named.title} others: {some(others, MOST_NAMES)}"
+    ]
+
+
+def _ended(named: NamedState, model: Model) -> tuple[str, ...]:
+    """The joints of a model that do not hold at the state."""
+    ended = tuple(joint for joint in named.ended if joint in model.joint_names)
+    for joint in ended:
+        if joint not in model.breaks:
+            raise _mistake(
+                named.title,
+                f"joint {joint} does not hold there: leave it out of the scene, or give it a force "
+                "that it breaks at (breaks_at)",
+            )
+    return ended
+
+
+def _state_of_result(result: Result, t: Any, model: Model, checked: ValidatedScene) -> NamedState:
     """The state of a result at a time, s; None for its end.
 
     Between two reported instants it is interpolated: r, p by polynomials of degree five through
@@ -180,15 +211,34 @@ def _state_of_result(
             )
         )
     angles: dict[str, float] = {}
-    if with_angles and result.summary.angle_count:
+    if model.angle_count and result.summary.angle_count:
         values = (1.0 - fraction) * result.arrays.angles[before]
         values = values + fraction * result.arrays.angles[after]
-        names = result.summary.angle_names or _angle_names_of(result, registry)
+        names = result.summary.angle_names or _angle_names_of(result, checked)
         angles = dict(zip(names, values.tolist(), strict=False))  # none where they are not known
     u = _state_at(result, before, after, fraction)
     states = _states_at(result, before, after, fraction)
+    own = parse(result.scene_text).inputs if result.summary.input_names else {}
+    inputs = zip(result.summary.input_names, result.inputs[before].tolist(), strict=True)
+    given = {name: value for name, value in inputs if value != own[name].value}
+    ended: dict[str, bool] = {}
+    for event in result.events:
+        if event.t <= time and event.kind in ("break", "engage"):
+            ended |= dict.fromkeys(
+                event.name.removeprefix("joint ").split(", "), event.kind == "break"
+            )
     return NamedState(title, result.summary.body_names, u, angles, tuple(notes),
-                      before != after, states)  # fmt: skip
+                      before != after, states, tuple(n for n, has in ended.items() if has),
+                      given | set_by_events(result, time))  # fmt: skip
+
+
+def set_by_events(result: Result, t: float) -> dict[str, Any]:
+    """Numbers of forces that events of a script had set by a time, force.field -> value."""
+    return {
+        f"{force}.{field}": value
+        for event in result.events if event.t <= t
+        for force, fields in event.changes.items() for field, value in fields.items()
+    }  # fmt: skip
 
 
 def _states_at(result: Result, before: int, after: int, fraction: float) -> dict[str, float]:
@@ -292,12 +342,13 @@ def _quintic(
     return value, slope
 
 
-def _angle_names_of(result: Result, registry: "Registry") -> tuple[str, ...]:
+def _angle_names_of(result: Result, checked: ValidatedScene) -> tuple[str, ...]:
     """Names of the angles of a result, from its scene: nothing is compiled. None if it has types
     that are not installed.
     """
     try:
-        names = build_model(validate(parse(result.scene_text), registry)).angle_names
+        other = validate(parse(result.scene_text), checked.registry)
+        names = build_model(other).angle_names
     except (SceneError, PluginError, ModelError):
         return ()
     return names if len(names) == result.summary.angle_count else ()

@@ -124,7 +124,12 @@ def actuators_of(
             found.append(_driver(evaluator, name))
         elif name in forces:
             force = ForceActuator(evaluator, name, *forces[name])
-            if not force.has_direction:
+            scene, field = compiled.scene, field_of(forces[name][0])
+            given = scene.forces[name].fields.get(field)
+            if isinstance(given, str) and given in {*scene.functions, *scene.inputs}:
+                words = f"its {field} is that of {given}, which an actuator does not set"
+                mistakes.append(Mistake("actuators", name, words, remedy=f"give {field} = 0.0"))
+            elif not force.has_direction:
                 words = "its vector is zero, so it has no direction to act in"
                 mistakes.append(Mistake("actuators", name, words, remedy="give it one"))
             found.append(force)

@@ -39,8 +39,8 @@ class Inputs:
     Attributes:
         wrench: (6 n, inputs) force and moment on each body.
         rate: (s, inputs) rates of the states of elements.
-        driver: (drivers, inputs) accelerations of drivers.
-        rows: of these drivers; None where there are none.
+        driver: (drivers, inputs) accelerations of drivers, and behind them numbers that rows read.
+        rows: of these; None where there are none.
         units: SI units of the inputs.
         numbers: array of the evaluator and place in it, flat, of the number that an input is; None
             of factors and drivers.
@@ -68,19 +68,22 @@ def inputs_of(point: OperatingPoint, names: Sequence[str]) -> Inputs:
     rate = np.zeros((point.model.state_count, len(names)))
     units, notes = [], []
     numbers: list[tuple[str, int] | None] = []
-    drivers: list[list[Floats]] = []
-    driver = np.zeros((len(names), len(names)))
+    drivers, read, last = [], [], []  # places of inputs with the rows that they move
     with point.compiled.borrow_evaluator() as evaluator:
         evaluator.states = point.states
         evaluator.place(point.t, point.u)
         for k, name in enumerate(names):
             element = name.partition(".")[0]
             if name in point.model.input_names:
-                numbers.append(_by_input(point, evaluator, name, wrench[:, k], rate[:, k]))
+                gamma = np.zeros(point.model.row_count)
+                numbers.append(_by_input(point, evaluator, name, wrench[:, k], rate[:, k], gamma))
                 units.append("1")
+                if np.any(gamma):
+                    read.append(k)
+                    last.append(gamma)
+                    continue
             elif element not in point.model.force_names:
-                driver[len(drivers), k] = 1.0
-                drivers.append(_driver(point, evaluator, name))
+                drivers.append((k, _driver(point, evaluator, name)))
                 numbers.append(None)
                 units.append("SI")
                 continue
@@ -91,34 +94,51 @@ def inputs_of(point: OperatingPoint, names: Sequence[str]) -> Inputs:
             if not np.any(wrench[:, k]) and not np.any(rate[:, k]):
                 notes.append(f"input {name} has no effect at this state")
     rows = None
-    if drivers:
-        by = np.array(drivers).transpose(1, 2, 0)
-        rows = DriverRows(nu=(by[0], by[1]), gamma=(by[2], by[3], by[4]))
-    driver = driver[: len(drivers)]
+    if drivers or read:
+        by = np.reshape([of for _, of in drivers], (-1, 5, point.model.row_count))
+        nu_0, nu_1, *first, acceleration = by.transpose(1, 2, 0)
+        found = first[0], first[1], np.column_stack([acceleration, *last])
+        rows = DriverRows(nu=(nu_0, nu_1), gamma=found)
+    driver = np.eye(len(names))[[*(k for k, _ in drivers), *read]]
     factors = frozenset(name for name in names if name in point.model.force_names)
     return Inputs(wrench, rate, driver, rows, tuple(units), tuple(numbers), factors, tuple(notes))
 
 
 def _by_input(
-    point: OperatingPoint, evaluator: Evaluator, name: str, wrench: Floats, rate: Floats
-) -> tuple[str, int]:
-    """Add the derivatives of all forces (6 n,) and rates of states (s,) by an input of the scene.
+    point: OperatingPoint, evaluator: Evaluator, name: str, wrench: Floats, rate: Floats,
+    gamma: Floats,
+) -> tuple[str, int]:  # fmt: skip
+    """Add the derivatives of all forces (6 n,), rates of states (s,) and right-hand sides of the
+    accelerations of rows by an input of the scene.
 
     Returns:
         where its number is.
 
     Raises:
-        UnknownNameError: a driver reads it, or a force on reactions.
+        UnknownNameError: velocities of a driver jump with it, or a force on reactions reads it.
     """
-    model = point.model
+    model, start = point.model, point.model.joint_start
     row = int(model.input_rows[model.input_names.index(name)])
     for loop, (kind, group) in enumerate(evaluator.loop_groups):
         for column in range(len(group.type_info.layout.functions)):
             mine = group.functions[:, column] == row
-            if kind == "wrench" and np.any(mine):
+            if not np.any(mine):
+                continue
+            if kind in ("wrench", "rate"):
                 _add(point, evaluator, loop, mine, wrench, rate, functions=[(column, 0)])
-            elif kind in ("friction", "acceleration") and np.any(mine):
-                _refuse_input(model, name, kind, int(group.members[np.argmax(mine)]))
+            elif kind == "friction":
+                force = model.force_names[int(group.members[np.argmax(mine)])]
+                words = f"{force}, which reads it, acts by reactions of joints"
+                raise UnknownNameError(f"input {name!r}: {words}")
+            elif kind == "acceleration":
+                first = tuple(evaluator.system.groups[loop].tolist())
+                own = differentiate_loop(group.type_info, kind, point.t, evaluator.system, first,
+                                         functions=[(column, 0)]).outputs  # fmt: skip
+                for place in np.flatnonzero(mine):
+                    joint = int(group.members[place])
+                    if np.any(own["nu"][1][place, :, -1]):
+                        _refuse_speed(name, model.joint_names[joint])
+                    gamma[start[joint] : start[joint + 1]] += own["gamma"][1][place, :, -1]
     return "F", row * evaluator.system.F.shape[1]
 
 
@@ -132,8 +152,9 @@ def _add(
         mine: (m,) True for these instances.
         by: ``numbers`` or ``functions`` of ``differentiate_loop``, one of them.
     """
-    group, first = evaluator.loop_groups[loop][1], tuple(evaluator.system.groups[loop].tolist())
-    for what in ("wrench", "rate") if by and computes_rate(group.type_info) else ("wrench",):
+    kind, group = evaluator.loop_groups[loop]
+    first = tuple(evaluator.system.groups[loop].tolist())
+    for what in ("rate", kind) if by and computes_rate(group.type_info) else (kind,):
         own = differentiate_loop(group.type_info, what, point.t, evaluator.system, first, **by)
         value, slope = own.outputs[what]
         part = (slope[..., -1] if by else value)[mine]
@@ -146,14 +167,11 @@ def _add(
             rate[places + np.arange(part.shape[1])] += part
 
 
-def _refuse_input(model: Model, name: str, kind: str, element: int) -> NoReturn:
-    if kind == "friction":
-        words = f"{model.force_names[element]}, which reads it, acts by reactions of joints"
-        raise UnknownNameError(f"input {name!r}: {words}")
-    joint = model.joint_names[element]
+def _refuse_speed(name: str, joint: str) -> NoReturn:
     raise UnknownNameError(
-        f"input {name!r} is read by the driver {joint}, whose velocity jumps with it: equations "
-        f"of motion have no such input; drive it by a function, and name {joint}"
+        f"input {name!r} is read by the driver {joint}, whose velocity jumps with it: equations of "
+        f"motion have no such input. Drive {joint} by a function of time in its place, and name "
+        f"{joint} itself: its acceleration is the input then"
     )
 
 

@@ -22,6 +22,7 @@ from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError, refuse_collisions
 from dap3d_core.simulation.initial.assemble import correct_initial, fit_of, violation
 from dap3d_core.simulation.initial.given_state import state_of, time_of
+from dap3d_core.simulation.initial.start_state import set_by_events
 from dap3d_core.simulation.initial_state import start_notes
 from dap3d_core.simulation.linearization.scaled_equations import ScaledEquations, scaled_equations
 from dap3d_core.simulation.linearization.steady_motion import SteadyFrames, steady_frames
@@ -243,14 +244,9 @@ def _state(
 
 def _refuse_changed(scene: Scene, result: Result, t: float) -> None:
     """Refuses forces that by t an event gave other numbers than they have in the scene."""
-    now = {
-        (force, field): value
-        for event in result.events if event.t <= t
-        for force, fields in event.changes.items() if force in scene.forces
-        for field, value in fields.items()
-    }  # fmt: skip
-    for (force, field), value in now.items():
-        own: Any = scene.forces[force].fields.get(field)
+    for name, value in set_by_events(result, t).items():
+        force, _, field = name.rpartition(".")
+        own: Any = scene.forces[force].fields.get(field) if force in scene.forces else value
         if not np.array_equal(own, value):
             raise SimulationError(
                 f"an event of the run has set {field} = {value} of force {force}: give it to the "

@@ -28,7 +28,8 @@ class DriverRows:
     """Derivatives of right-hand sides of rows by drivers, (rows, drivers) each.
 
     Attributes:
-        nu: by displacement, rate; gamma: by displacement, rate, acceleration.
+        nu: by displacement, rate; gamma: by displacement, rate, acceleration. The last has columns
+            of numbers that rows read as well, without displacements, behind those of drivers.
     """
 
     nu: tuple[Floats, Floats]
@@ -47,7 +48,8 @@ class StateSpace:
         own: (states, s) unit columns of the states of elements among all.
         acceleration_by_force: (6 n, 6 n), multipliers_by_force: (rows, 6 n).
         driver_input: (states, drivers), acceleration_by_driver: (6 n, drivers),
-            multipliers_by_driver: (rows, drivers): by accelerations of drivers.
+            multipliers_by_driver: (rows, drivers): by accelerations of drivers, and by the numbers
+            behind them.
         coordinate_count: number of xi and w.
         size: magnitude of the terms that A is made of, 1/s: its rounding errors are eps of it.
     """
@@ -104,11 +106,12 @@ def state_space(
     solve = _Accelerations(equations, rows)
     v_dot, lam = solve(_placed(own.force, last, x.shape[1]) - (K @ x + C @ v), -by_motion)
     by_force, lam_by_force = solve(U.T, np.zeros((len(D), len(U))))
-    by_driver, lam_by_driver = solve(np.zeros((len(U), count)), gamma[2])
+    by_driver, lam_by_driver = solve(np.zeros((len(U), gamma[2].shape[1])), gamma[2])
     rate = np.zeros((count, x.shape[1]))
     rate[:, last - count : last] = np.eye(count)
     above = np.zeros((Q.shape[1] + count, len(U)))
     below = np.zeros((count + own.count, len(U)))
+    steered = _placed(np.eye(len(below), count), 0, by_driver.shape[1])
     return StateSpace(
         A=np.vstack([Q.T @ (v + S @ x), rate, N.T @ v_dot, 0.0 * rate, own.rates(x, v)]),
         own=np.eye(x.shape[1])[:, last:],
@@ -119,9 +122,7 @@ def state_space(
         force_input=np.vstack([above, N.T @ by_force, below]),
         acceleration_by_force=U @ by_force,
         multipliers_by_force=lam_by_force / back,
-        driver_input=np.vstack(
-            [above @ by_driver, N.T @ by_driver, np.eye(count), below[count:] @ by_driver]
-        ),
+        driver_input=np.vstack([above @ by_driver, N.T @ by_driver, steered]),
         acceleration_by_driver=U @ by_driver,
         multipliers_by_driver=lam_by_driver / back,
         coordinate_count=Q.shape[1] + count,

@@ -8,7 +8,7 @@ import numpy as np
 
 from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.linear.rank.rank import FEW_ROWS, WEIGHT, Dependency, Rank, dense_rank, sparse_rank
 from dap3d_core.model import Model
 from dap3d_core.registry.suggestions import some
@@ -237,21 +237,20 @@ def rank_of(evaluator: Evaluator, rows: ConstraintRows) -> Rank:
     opening tilts rows that would depend on each other by as much.
     """
     model, blur = evaluator.model, fit_of(evaluator.model)
-    if model.active:
-        return _rank_of_active(model, rows.dense(), blur)
+    if model.breaks and len(there := _rows_there(model, rows.dense())) < rows.shape[0]:
+        rank = dense_rank(rows.dense()[there], blur)
+        own = (attrs.evolve(d, rows=there[d.rows]) for d in rank.dependencies)
+        return attrs.evolve(rank, dependencies=tuple(own))
     if model.row_count <= FEW_ROWS or model.contact_count:
         return dense_rank(rows.dense(), blur)
     D = evaluator.blocks(rows)
     return sparse_rank(evaluator.plan, D, evaluator.system.row, 6 * model.body_count, blur)
 
 
-def _rank_of_active(model: Model, D: Floats, blur: float) -> Rank:
-    """The rank of the rows of joints that are there; those of joints that are not are zero."""
+def _rows_there(model: Model, D: Floats) -> Integers:
+    """Places of the rows of joints that hold; those of joints that do not are zero."""
     names = np.repeat(model.joint_names, np.diff(model.joint_start))[: len(D)]
-    there = np.flatnonzero(D.any(axis=1) | ~np.isin(names, list(model.active)))
-    rank = dense_rank(D[there], blur)
-    own = (attrs.evolve(d, rows=there[d.rows]) for d in rank.dependencies)
-    return attrs.evolve(rank, dependencies=tuple(own))
+    return np.flatnonzero(D.any(axis=1) | ~np.isin(names, list(model.breaks)))
 
 
 def by_joint(model: Model, rows: Any) -> list[tuple[int, Any]]:

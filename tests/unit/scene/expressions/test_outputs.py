@@ -51,6 +51,19 @@ def test_a_wrong_output_is_named_with_its_line(tmp_path, line, words):
     assert mistake.key.startswith("outputs.")
 
 
+def test_outputs_of_nothing_are_told_with_other_mistakes(tmp_path):
+    """Names of bodies that are wrong themselves, of points of contacts and of limits are known."""
+    path = tmp_path / "scene.toml"
+    names = ("stoen.r.z", "tt", "stone.r.z", "energy.total", "gravity_lower.gap", "gravity#1.gap")
+    lines = "".join(f"q{k} = '{name}'\n" for k, name in enumerate(names))
+    path.write_text(FALLING.replace("mass = ", "mass = -") + lines)
+    with pytest.raises(dap.SceneError) as refused:
+        dap.compile(path)
+    found = {one.key: one for one in refused.value.mistakes}
+    assert set(found) == {"bodies.stone.mass", "outputs.q0", "outputs.q1"}
+    assert found["outputs.q0"].nearest == "stone"
+
+
 def test_a_circle_of_several_is_told_in_its_order(tmp_path):
     mistake = mistake_of(tmp_path, "a = 'b + 1'\nb = 'c.x'\nc = 'a * stone.r'\n")
     assert any(circle in mistake.what for circle in ("a -> b -> c -> a", "b -> c -> a -> b",

@@ -36,7 +36,7 @@ def test_two_runs_in_a_row_are_one(swing):
 def test_a_reported_instant_is_taken_as_it_is(swing):
     scene, result = swing
     model = dap.compile(scene)
-    state = start_state((result, 0.1), model.model, model.checked.registry)
+    state = start_state((result, 0.1), model.model, model.checked)
     assert np.array_equal(state.u, result.u[5])
     assert not state.is_interpolated
 
@@ -49,7 +49,7 @@ def test_between_instants_the_state_is_interpolated_to_fifth_order(swing):
     errors = []
     for dt in (0.1, 0.05):  # 0.17 is at 0.7 and 0.4 of a step, where the error is alike
         result = dap.simulate(scene, **SHORT | {"dt": dt})
-        state = start_state((result, 0.17), model.model, model.checked.registry)
+        state = start_state((result, 0.17), model.model, model.checked)
         errors.append(np.max(np.abs(state.u - exact)[:7]))
     assert errors[0] < 1e-5
     assert 30 < errors[0] / errors[1] < 130
@@ -118,6 +118,57 @@ def test_a_run_started_at_rest_stays_there_and_can_be_repeated():
     assert dap.rerun(result).equal
     by_hand = dap.simulate(at_rest.toggle(1.2), start=dap.equilibrium(at_rest.toggle(1.2)), **SHORT)
     assert np.array_equal(by_hand.u, result.u)
+
+
+def test_what_a_script_had_set_is_named_and_the_scene_keeps_its_numbers():
+    """An input held by steps, and a number that an event set."""
+    scene = at_rest.ball()
+    scene.add_input("thrust", value=0.5)
+    scene.add_force("f", "jet", body_i="ball", f=(1.0, 0.0, 0.0), input="thrust")
+    run = dap.start(scene)
+    run.step(0.1, inputs={"thrust": 3.0})
+    found = dap.simulate(scene, start=run.result(), t_end=0.1)
+    assert found.inputs.tolist() == [[0.5]] * len(found.t)
+    assert any("others: thrust (3.0, here 0.5)" in note for note in found.notes)
+    gust = dap.Event("ball.r.z", at=scene.bodies["ball"].r[2] - 0.1,
+                     action=lambda state: state.set("jet", f=(9.0, 0.0, 0.0)))  # fmt: skip
+    changed = dap.simulate(scene, t_end=0.5, events=[gust])
+    after = dap.simulate(scene, start=changed, t_end=0.1)
+    assert any("jet.f ([9.0, 0.0, 0.0], here [1.0, 0.0, 0.0])" in note for note in after.notes)
+    before = dap.simulate(scene, start=(changed, changed.t[1]), t_end=0.1)
+    assert not any("others" in note for note in before.notes)
+
+
+def test_a_joint_that_has_broken_stays_so(tmp_path):
+    """Through two further runs and a checkpoint; a scene in which it cannot be so is refused."""
+    rod = dap.Scene(name="rod")
+    rod.add_body("bob", mass=2.0, Jp=(0.1, 0.1, 0.1), r=(1.0, 0.0, 0.0))
+    rod.add_point("hook", "bob", (-1.0, 0.0, 0.0))
+    rod.add_force("weight", "gravity", gravity=9.81)
+    rod.add_joint("sph", "rod", P_i="hook", P_j="ground.O", breaks_at=40.0)
+    first = dap.simulate(rod, t_end=1.0)
+    second = dap.simulate(rod, start=first, t_end=0.1)
+    third = dap.simulate(rod, start=second, t_end=0.1)
+    assert np.array_equal(third.u[0], second.u[-1])
+    fallen = first.r[-1, 0] + 0.2 * first.rd[-1, 0] - [0.0, 0.0, 0.5 * 9.81 * 0.2**2]
+    assert third.r[-1, 0] == pytest.approx(fallen, abs=1e-12)
+    assert [(e.kind, e.name, e.t) for e in third.events] == [("break", "rod", 0.0)]
+    assert not any("redundant" in note for note in third.notes)
+    before = dap.simulate(rod, start=(first, 0.3), t_end=0.2)
+    (broken,) = before.events
+    assert broken.t == pytest.approx(first.events[0].t - 0.3, abs=1e-6)
+
+    def progress(t, t_end):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as error:
+        dap.simulate(rod, start=first, t_end=0.1, progress=progress, output=tmp_path / "run.nc",
+                     checkpoint=float("inf"))  # fmt: skip
+    assert np.array_equal(dap.resume(error.value.checkpoint).u, second.u)
+    firm = rod.copy()
+    del firm.joints["rod"].fields["breaks_at"]
+    with pytest.raises(dap.SceneError, match="joint rod does not hold there"):
+        dap.simulate(firm, start=first, t_end=0.1)
 
 
 def test_no_equilibrium_is_no_run():
