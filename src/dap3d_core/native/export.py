@@ -191,7 +191,8 @@ def _parameters(
         raise SceneError([attrs.evolve(m, key="parameters") for m in error.mistakes]) from None
     found = [_parameter(prepared, parameter, options, outputs) for parameter in parameters]
     limits = limits_of(prepared, parameters, allow_code=bool(options.get("allow_code")))
-    return [attrs.evolve(v, limits=x) for v, x in zip(found, limits, strict=True)]
+    pairs = zip(found, limits, strict=True)
+    return [attrs.evolve(v, limits=x, label="; ".join([v.label, *x.words])) for v, x in pairs]
 
 
 def _refuse_shared(variables: Sequence[Variable]) -> None:
@@ -274,7 +275,7 @@ def variables_header(prepared: PreparedRun, variables: Sequence[Variable]) -> st
         while word in used:
             word += "_"
         used.add(word)
-        words = [f"{v.kind}: {v.name} [{v.unit}]", *(said for *_, said in v.limits.ends if said)]
+        words = [f"{v.kind}: {v.name} [{v.unit}]", *v.limits.words]
         note = "; ".join(words).replace("*/", "* /")
         lines.append(f"    V_{word} = {k}, /* {note} */")
     return "\n".join([*lines, "};", ""])

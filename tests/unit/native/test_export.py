@@ -213,6 +213,28 @@ def test_values_that_a_scene_refuses_are_refused(tmp_path):
             run.step_to(0.1)
 
 
+def test_parameters_of_which_one_is_under_the_other_are_set_one_by_one(tmp_path):
+    """In any order; where a run goes on they have to be in theirs."""
+    scene = _written(SPRING, tmp_path)
+    scene.add_force("tran_friction", "rub", joint="track", f_c=0.3, f_s=0.4)
+    names = ["forces.rub.f_c", "forces.rub.f_s"]
+    made, library = exported(scene, tmp_path, parameters=names)
+    assert "at most forces.rub.f_s" in (made.path / "variables.h").read_text()
+    run = library.start(1.0)
+    run[names[0]] = 0.8
+    y = run.values([name for name, kind in library.kinds.items() if kind == "state"])
+    said = r"f_c = 0\.8: should be at most forces\.rub\.f_s = 0\.4"
+    for go_on in (lambda: run.step_to(0.5), lambda: run.derivatives(0.0, y)):
+        with pytest.raises(dap.SimulationError, match=said):
+            go_on()
+    run[names[1]] = 0.9
+    run.step_to(0.5)
+    scene.forces["rub"].fields |= {"f_c": 0.8, "f_s": 0.9}
+    here = dap.start(scene, t_end=1.0)
+    here.step(0.5)
+    assert run["state.cart.r.x"] == here.state["cart.r.x"]
+
+
 def test_a_parameter_of_a_table_is_one_as_well(tmp_path):
     scene = _written(SPRING, tmp_path)
     made, _ = exported(scene, tmp_path, parameters=["parameters.stiffness"])
