@@ -409,12 +409,20 @@ def declared_ball(speed=3.0, **resistance):
 RESISTING = partial(declared_ball, 0.5, mu_roll=0.02, mu_spin=0.005)
 
 
+def dropped_ball():
+    """What an impact leaves of the rate of its gap is stopped."""
+    scene = declared_ball(0.3)
+    scene.bodies["ball"].r = (0.0, 0.0, 0.11)
+    return scene
+
+
 @pytest.mark.every(3)
 @pytest.mark.parametrize(("make", "more", "settings"), [
     (falling_ball, ["ball.rdd"], {}),
     (partial(falling_ball, mu_roll=0.01, mu_spin=0.01), ["ball.rdd"], {}),
     (declared_ball, ["ball.rdd"], {"contact": "stepping", "contact_step": 2e-3}),
     (RESISTING, ["ball.rdd"], {"contact": "events", "integrator": "dop853"}),
+    (dropped_ball, [], {"contact": "events", "integrator": "dop853"}),
     (lambda: dap.load("quadruped"), ["trunk.rdd", "front_left_hinge.i.force"], {}),
 ])  # fmt: skip
 @pytest.mark.slow
