@@ -409,10 +409,17 @@ def declared_ball(speed=3.0, **resistance):
 RESISTING = partial(declared_ball, 0.5, mu_roll=0.02, mu_spin=0.005)
 
 
-def dropped_ball():
-    """What an impact leaves of the rate of its gap is stopped."""
-    scene = declared_ball(0.3)
-    scene.bodies["ball"].r = (0.0, 0.0, 0.11)
+def dropped_capsule():
+    """Of the rates of what touches, a little is left by impacts, which is stopped."""
+    scene = dap.Scene(name="dropped")
+    motion = {"r_dot": [0.3, 0.2, 0.0], "w": [0.0, 1.0, 0.5]}
+    scene.add_body("bar", mass=1.0, Jp=[0.002, 0.01, 0.01], r=[0.0, 0.0, 0.07], **motion)
+    ends = {
+        side: scene.add_point(side, "bar", [x, 0.0, 0.0])
+        for side, x in (("P_i", 0.2), ("Q_i", -0.2))
+    }
+    scene.add_contact("capsule_plane", "floor", radius=0.05, mu=0.4, **ends)
+    scene.add_force("weight", "gravity")
     return scene
 
 
@@ -422,7 +429,7 @@ def dropped_ball():
     (partial(falling_ball, mu_roll=0.01, mu_spin=0.01), ["ball.rdd"], {}),
     (declared_ball, ["ball.rdd"], {"contact": "stepping", "contact_step": 2e-3}),
     (RESISTING, ["ball.rdd"], {"contact": "events", "integrator": "dop853"}),
-    (dropped_ball, [], {"contact": "events", "integrator": "dop853"}),
+    (dropped_capsule, [], {"contact": "events", "integrator": "dop853"}),
     (lambda: dap.load("quadruped"), ["trunk.rdd", "front_left_hinge.i.force"], {}),
 ])  # fmt: skip
 @pytest.mark.slow
