@@ -174,7 +174,7 @@ def _copy(made: Path, target: Path) -> None:
             if file.is_file():
                 copy.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy(file, copy)
-    except OSError:
+    except BaseException:
         if not was_there:
             shutil.rmtree(target, ignore_errors=True)
         raise
