@@ -4,6 +4,7 @@ import shutil
 import subprocess
 from functools import partial
 from pathlib import Path
+from xml.etree import ElementTree
 
 import attrs
 import numpy as np
@@ -16,6 +17,7 @@ import dap3d_core as dap
 from dap3d_core.integrators.moreau import arrays
 from dap3d_core.native import export
 from dap3d_core.native.build import own_platform
+from dap3d_core.native.fmu import description_of
 
 SPRING = """
 [scene]
@@ -233,6 +235,21 @@ def test_parameters_of_which_one_is_under_the_other_are_set_one_by_one(tmp_path)
     here = dap.start(scene, t_end=1.0)
     here.step(0.5)
     assert run["state.cart.r.x"] == here.state["cart.r.x"]
+
+
+def test_names_and_descriptions_end_no_comment_and_are_legal_xml(tmp_path):
+    scene = _written(SPRING, tmp_path)
+    scene.name, scene.description = "n" * 300, "an end */ int x; what ??/ /* \x01 \ufffe ]]> <b>"
+    scene.add_body("größe/*", mass=1.0)
+    model = export.model_of(scene, ["größe/*.r"])
+    assert model.name == "n" * export.LONGEST
+    header = export.variables_header(model.prepared, model.variables)
+    head, *lines = header.splitlines()
+    assert head.endswith("an end * / int x; what ? ?/ / * \x01 \ufffe ]]> <b>")
+    assert any("V_GR_E_R_X = " in line and line.count("/*") == 1 for line in lines)
+    for fmi in (2, 3):
+        root = ElementTree.fromstring(description_of(model, "{}", fmi))
+        assert root.get("description") == scene.description.translate({1: " ", 0xFFFE: " "})
 
 
 def test_a_parameter_of_a_table_is_one_as_well(tmp_path):
