@@ -63,8 +63,9 @@ def places_of(
     try:
         others = [PreparedRun(with_values(scene, [parameter], [x]), **options) for x in trials]
     except (SceneError, SimulationError, PluginError, ModelError) as error:
-        is_of_scene = isinstance(error, SceneError)
-        why = error.mistakes[0].what if is_of_scene else str(error).splitlines()[0].rstrip(":")
+        why = str(error).splitlines()[0].rstrip(":")
+        if isinstance(error, SceneError):
+            why = error.mistakes[0].what
         raise refusal(
             f"parameter {name} cannot be set in an exported model: a value near its own is "
             f"refused: {why}",
