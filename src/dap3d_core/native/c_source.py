@@ -243,7 +243,15 @@ def _variables(variables: Sequence[Variable]) -> list[str]:
         "static const struct {\n    int64_t word;\n    double sign, low;\n    int below;\n"
         "    double high;\n    int above;\n} places[]"
     )
+    at = {v.name: k for k, v in enumerate(variables)}
+    orders = [
+        f"{{{k}, {at[v.limits.under]}, {int(v.limits.is_open)}}}"
+        for k, v in enumerate(variables) if v.limits.under
+    ]  # fmt: skip
     lines = ["static const char texts[] =", *texts_of, ";", *_table(head, rows)]
+    lines.append(f"#define ORDERS {len(orders)}")
+    lines += _table("static const struct { int low, high, is_open; } orders[]",
+                    orders or ["{0, 0, 0}"])  # fmt: skip
     return lines + _table(head_of_places, places or ["{0, 1.0, 0.0, 0, 0.0, 0}"])
 
 

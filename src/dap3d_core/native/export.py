@@ -34,6 +34,8 @@ from dap3d_core.study.parameters import SceneParameter, parameters_named
 
 #: Formats, with the suffix of their files; "c" is a folder.
 NATIVE_FORMATS = {"c": "", "fmu": ".fmu"}
+#: Letters of the name of a library at most.
+LONGEST = 100
 SOURCE = Path(__file__).parent / "source"
 #: Files of it with words of the model.
 WRITTEN = ("example.c", "example.rs", "example.m", "CMakeLists.txt", "README.md")
@@ -134,7 +136,8 @@ def model_of(
     variables = variables_of(prepared, given.found, chosen)
     _refuse_shared(variables)
     word = re.sub(r"\W+", "_", str(scene.name or name), flags=re.ASCII) or "model"
-    word = f"_{word}" if word[0].isdigit() else word  # an identifier of C
+    # an identifier of C, and part of the names of files
+    word = f"_{word}"[:LONGEST] if word[0].isdigit() else word[:LONGEST]
     return Exported(prepared, variables, word, given, directions)
 
 
@@ -171,7 +174,7 @@ def _copy(made: Path, target: Path) -> None:
             if file.is_file():
                 copy.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy(file, copy)
-    except OSError:
+    except BaseException:
         if not was_there:
             shutil.rmtree(target, ignore_errors=True)
         raise
@@ -191,7 +194,8 @@ def _parameters(
         raise SceneError([attrs.evolve(m, key="parameters") for m in error.mistakes]) from None
     found = [_parameter(prepared, parameter, options, outputs) for parameter in parameters]
     limits = limits_of(prepared, parameters, allow_code=bool(options.get("allow_code")))
-    return [attrs.evolve(v, limits=x) for v, x in zip(found, limits, strict=True)]
+    pairs = zip(found, limits, strict=True)
+    return [attrs.evolve(v, limits=x, label="; ".join([v.label, *x.words])) for v, x in pairs]
 
 
 def _refuse_shared(variables: Sequence[Variable]) -> None:
@@ -267,17 +271,22 @@ def library_name(name: str, target: Platform) -> str:
 def variables_header(prepared: PreparedRun, variables: Sequence[Variable]) -> str:
     """The text of variables.h: references of the variables."""
     title = prepared.compiled.scene.description or prepared.compiled.scene.name
-    lines = [f"/* Variables of the model: {title}", "   Units are in brackets. */", "enum {"]
+    head = f"/* Variables of the model: {_comment(title)}"
+    lines = [head, "   Units are in brackets. */", "enum {"]
     used: set[str] = set()
     for k, v in enumerate(variables):
-        word = re.sub(r"\W+", "_", v.name).strip("_").upper()
+        word = re.sub(r"\W+", "_", v.name, flags=re.ASCII).strip("_").upper()
         while word in used:
             word += "_"
         used.add(word)
-        words = [f"{v.kind}: {v.name} [{v.unit}]", *(said for *_, said in v.limits.ends if said)]
-        note = "; ".join(words).replace("*/", "* /")
-        lines.append(f"    V_{word} = {k}, /* {note} */")
+        words = [f"{v.kind}: {v.name} [{v.unit}]", *v.limits.words]
+        lines.append(f"    V_{word} = {k}, /* {_comment('; '.join(words))} */")
     return "\n".join([*lines, "};", ""])
+
+
+def _comment(text: str) -> str:
+    """A text within a comment of C, which it neither ends nor makes compilers warn of."""
+    return re.sub(r"(?<=\*)(?=/)|(?<=/)(?=\*)|(?<=\?)(?=\?)", " ", text)
 
 
 def _words(model: Exported, platforms: Sequence[Platform]) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 import datetime
 import hashlib
+import re
 import zipfile
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -77,7 +78,7 @@ def description_of(model: Exported, token: str, fmi: int) -> bytes:
             "fmiVersion": f"{fmi}.0",
             "modelName": model.name,
             "guid" if fmi == 2 else "instantiationToken": token,
-            "description": str(scene.description or ""),
+            "description": _legal(scene.description),
             "generationTool": f"dap3d {current_versions()['dap3d']}",
             "generationDateAndTime": now,
             "variableNamingConvention": "flat",
@@ -100,6 +101,11 @@ def description_of(model: Exported, token: str, fmi: int) -> bytes:
     indent(root)
     text: bytes = tostring(root, encoding="UTF-8", xml_declaration=True)
     return text
+
+
+def _legal(text: str | None) -> str:
+    """A text without characters that XML does not have; names hold none."""
+    return re.sub("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", " ", text or "")
 
 
 def _capabilities(root: Element, model: Exported, fmi: int) -> None:
@@ -205,7 +211,7 @@ def _page(model: Exported) -> bytes:
     root = Element("html")
     body = SubElement(root, "body")
     SubElement(body, "h1").text = model.name
-    SubElement(body, "p").text = str(scene.description or "")
+    SubElement(body, "p").text = _legal(scene.description)
     SubElement(body, "p").text = (
         f"A model of dap3d {current_versions()['dap3d']}: method {prepared.compiled.method}, "
         f"integrator {settings.integrator}, rtol {settings.rtol}, atol {settings.atol}."

@@ -4,6 +4,7 @@ import shutil
 import subprocess
 from functools import partial
 from pathlib import Path
+from xml.etree import ElementTree
 
 import attrs
 import numpy as np
@@ -16,6 +17,7 @@ import dap3d_core as dap
 from dap3d_core.integrators.moreau import arrays
 from dap3d_core.native import export
 from dap3d_core.native.build import own_platform
+from dap3d_core.native.fmu import description_of
 
 SPRING = """
 [scene]
@@ -213,6 +215,43 @@ def test_values_that_a_scene_refuses_are_refused(tmp_path):
             run.step_to(0.1)
 
 
+def test_parameters_of_which_one_is_under_the_other_are_set_one_by_one(tmp_path):
+    """In any order; where a run goes on they have to be in theirs."""
+    scene = _written(SPRING, tmp_path)
+    scene.add_force("tran_friction", "rub", joint="track", f_c=0.3, f_s=0.4)
+    names = ["forces.rub.f_c", "forces.rub.f_s"]
+    made, library = exported(scene, tmp_path, parameters=names)
+    assert "at most forces.rub.f_s" in (made.path / "variables.h").read_text()
+    run = library.start(1.0)
+    run[names[0]] = 0.8
+    y = run.values([name for name, kind in library.kinds.items() if kind == "state"])
+    said = r"f_c = 0\.8: should be at most forces\.rub\.f_s = 0\.4"
+    for go_on in (lambda: run.step_to(0.5), lambda: run.derivatives(0.0, y)):
+        with pytest.raises(dap.SimulationError, match=said):
+            go_on()
+    run[names[1]] = 0.9
+    run.step_to(0.5)
+    scene.forces["rub"].fields |= {"f_c": 0.8, "f_s": 0.9}
+    here = dap.start(scene, t_end=1.0)
+    here.step(0.5)
+    assert run["state.cart.r.x"] == here.state["cart.r.x"]
+
+
+def test_names_and_descriptions_end_no_comment_and_are_legal_xml(tmp_path):
+    scene = _written(SPRING, tmp_path)
+    scene.name, scene.description = "n" * 300, "an end */ int x; what ??/ /* \x01 \ufffe ]]> <b>"
+    scene.add_body("größe/*", mass=1.0)
+    model = export.model_of(scene, ["größe/*.r"])
+    assert model.name == "n" * export.LONGEST
+    header = export.variables_header(model.prepared, model.variables)
+    head, *lines = header.splitlines()
+    assert head.endswith("an end * / int x; what ? ?/ / * \x01 \ufffe ]]> <b>")
+    assert any("V_GR_E_R_X = " in line and line.count("/*") == 1 for line in lines)
+    for fmi in (2, 3):
+        root = ElementTree.fromstring(description_of(model, "{}", fmi))
+        assert root.get("description") == scene.description.translate({1: " ", 0xFFFE: " "})
+
+
 def test_a_parameter_of_a_table_is_one_as_well(tmp_path):
     scene = _written(SPRING, tmp_path)
     made, _ = exported(scene, tmp_path, parameters=["parameters.stiffness"])
@@ -387,12 +426,27 @@ def declared_ball(speed=3.0, **resistance):
 RESISTING = partial(declared_ball, 0.5, mu_roll=0.02, mu_spin=0.005)
 
 
+def dropped_capsule():
+    """Of the rates of what touches, a little is left by impacts, which is stopped."""
+    scene = dap.Scene(name="dropped")
+    motion = {"r_dot": [0.3, 0.2, 0.0], "w": [0.0, 1.0, 0.5]}
+    scene.add_body("bar", mass=1.0, Jp=[0.002, 0.01, 0.01], r=[0.0, 0.0, 0.07], **motion)
+    ends = {
+        side: scene.add_point(side, "bar", [x, 0.0, 0.0])
+        for side, x in (("P_i", 0.2), ("Q_i", -0.2))
+    }
+    scene.add_contact("capsule_plane", "floor", radius=0.05, mu=0.4, **ends)
+    scene.add_force("weight", "gravity")
+    return scene
+
+
 @pytest.mark.every(3)
 @pytest.mark.parametrize(("make", "more", "settings"), [
     (falling_ball, ["ball.rdd"], {}),
     (partial(falling_ball, mu_roll=0.01, mu_spin=0.01), ["ball.rdd"], {}),
     (declared_ball, ["ball.rdd"], {"contact": "stepping", "contact_step": 2e-3}),
     (RESISTING, ["ball.rdd"], {"contact": "events", "integrator": "dop853"}),
+    (dropped_capsule, [], {"contact": "events", "integrator": "dop853"}),
     (lambda: dap.load("quadruped"), ["trunk.rdd", "front_left_hinge.i.force"], {}),
 ])  # fmt: skip
 @pytest.mark.slow

@@ -14,10 +14,13 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS
 from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.interface.errors import PluginError
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.model import ModelError
 from dap3d_core.native.run.outputs import Outputs, outputs_of
 from dap3d_core.native.run.prepared import ContactCode, PreparedRun, refusal
 from dap3d_core.scene import SceneError
+from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.study.batch import initial_state
 from dap3d_core.study.parameters import SceneParameter, with_values
 
@@ -59,10 +62,13 @@ def places_of(
     scene = prepared.compiled.scene
     try:
         others = [PreparedRun(with_values(scene, [parameter], [x]), **options) for x in trials]
-    except SceneError as error:
+    except (SceneError, SimulationError, PluginError, ModelError) as error:
+        why = str(error).splitlines()[0].rstrip(":")
+        if isinstance(error, SceneError):
+            why = error.mistakes[0].what
         raise refusal(
             f"parameter {name} cannot be set in an exported model: a value near its own is "
-            f"refused: {error.mistakes[0].what}",
+            f"refused: {why}",
             "export a model for each value",
         ) from error
     if any(one.stops != prepared.stops for one in others):

@@ -181,7 +181,7 @@ class ContactCode:
                 "export it by method lsq",
             )
         jumps = ContactJumps(evaluator)
-        table, arrays = jumps.table, jumps.table.arrays()
+        table, arrays = jumps.table, jumps.table.arrays(rounds=1)  # decisions ask if there was one
         arrays.jammed = -1
         given = arrays, evaluator.system, evaluator.loops, evaluator.functions, table.tensions
         types = [FLOAT, *map(type_of, given)]

@@ -93,7 +93,8 @@ DAP3D_API int dap3d_find(const char *name);
 /* Set an input or a parameter. It takes effect from the present time on. DAP3D_INVALID if the
    variable is neither, the value is not finite or not within the limits that variables.h names, or a
    fixed parameter is set in the course of a run: before it the start is found anew, and outputs show
-   what was set. Inertias are checked where the run begins. */
+   what was set. Inertias are checked where the run begins, and parameters of which one has to be under
+   another where it goes on: functions that need them return DAP3D_INVALID until they are. */
 DAP3D_API int dap3d_set(dap3d_model *model, int variable, double value);
 
 /* The value of a variable at the present time; not a number for a reference that is none. */

@@ -322,6 +322,21 @@ double dap3d_get(dap3d_model *m, int v)
     }
 }
 
+/* Whether parameters of which one has to be under the other are so: they are set one by one. */
+static int are_ordered(dap3d_model *m)
+{
+    for (int k = 0; k < ORDERS; k++) {
+        double low = dap3d_get(m, orders[k].low), high = dap3d_get(m, orders[k].high);
+        if (low < high || (low == high && !orders[k].is_open))
+            continue;
+        snprintf(m->message, sizeof m->message, "%.60s = %.9g: should be %s %.60s = %.9g",
+                 dap3d_name(orders[k].low), low, orders[k].is_open ? "less than" : "at most",
+                 dap3d_name(orders[k].high), high);
+        return 0;
+    }
+    return 1;
+}
+
 int dap3d_get_all(dap3d_model *m, const int *v, int count, double *values)
 {
     for (int k = 0; k < count; k++) {
@@ -887,6 +902,8 @@ int dap3d_step_to(dap3d_model *m, double t)
         t = m->t_end;
     if (t > m->t_end)
         return fail(m, DAP3D_INVALID, "the time is beyond the end that dap3d_create was given");
+    if (!are_ordered(m))
+        return DAP3D_INVALID;
     start(m);
     if (INPUTS > 0) /* its end is open: a usual number of such steps */
         m->span = fmin(1000.0 * (t - m->t), m->t_end);
@@ -967,6 +984,8 @@ int dap3d_derivatives(dap3d_model *m, double t, const double *y, double *rates)
 {
     if (COMPLETES) /* equations without contacts would be another model */
         return fail(m, DAP3D_INVALID, "steps follow contacts here: states have no derivatives");
+    if (!are_ordered(m))
+        return DAP3D_INVALID;
     call(m, RHS, t, y, rates, STATES);
     for (int k = 0; k < STATES; k++)
         if (!(fabs(rates[k]) <= LARGEST))
@@ -1086,6 +1105,8 @@ static int does_jump(dap3d_model *m, int k)
 int dap3d_event(dap3d_model *m, int *changed)
 {
     double y[STATES], moved;
+    if (!are_ordered(m))
+        return DAP3D_INVALID;
     dap3d_states(m, y);
     if (dap3d_project(m, m->t, y, &moved) != DAP3D_OK)
         return DAP3D_ERROR;

@@ -45,12 +45,29 @@ def test_open_and_closed_ends_are_said(tmp_path):
     assert [said for *_, said in e.ends] == ["should be at least 0", "should be at most 1"]
 
 
-def test_what_depends_on_another_is_refused_and_inertias_wait(tmp_path):
+def test_of_two_in_order_one_is_under_the_other(tmp_path):
+    """Whatever the other is; limits that are other numbers of the scene take a few checks."""
     names = "materials.surface.mu", "materials.surface.mu_s"
-    scene = falling_ball(mu_s=0.5)
-    assert [closed(*found_of(scene, n)) for n in names] == [(0.0, 0.5), (0.3, None)]
-    with pytest.raises(dap.SceneError, match=r"mu may be depends on materials\.surface\.mu_s"):
-        found_of(scene, *names)
+    scene = falling_ball(mu_s=0.45)
+    assert [closed(*found_of(scene, n)) for n in names] == [(0.0, 0.45), (0.3, None)]
+    for mu, mu_s in (found_of(scene, *names), found_of(scene, *names[::-1])[::-1]):
+        assert closed(mu) == closed(mu_s) == (0.0, None)
+        assert mu.words == ["should be at least 0", "should be at most materials.surface.mu_s"]
+        assert mu_s.words == ["should be at least 0"]
+    scene = _written(SPRING, tmp_path)  # beyond it, not at it
+    scene.add_function("b", "push", x_start=0.1, x_end=0.5, f_end=1.0)
+    scene.add_force("f", "kick", body_i="cart", f=(1.0, 0.0, 0.0), function="push")
+    found = found_of(scene, "functions.push.x_end", "functions.push.x_start")
+    assert [limits.under for limits in found] == ["", "functions.push.x_end"]
+    assert found[1].words == ["should be less than functions.push.x_end"]
+
+
+def test_other_dependence_is_refused_and_inertias_wait(tmp_path):
+    scene = braced(tmp_path)
+    scene.parameters |= {"one": 0.2, "more": 0.3}
+    scene.forces["brace"].fields["l0"] = "= 1 - one - more"
+    with pytest.raises(dap.SceneError, match=r"parameters\.one may be depends on parameters\.more"):
+        found_of(scene, "parameters.one", "parameters.more")
     names = "bodies.cart.Jp.x", "bodies.cart.mass"
     *inertias, mass = found_of(_written(SPRING, tmp_path), *names)
     assert inertias == [Limits()]
