@@ -125,8 +125,13 @@ def test_contacts_run_by_programs_of_their_modes(method, at_once):
 @pytest.mark.every(2)
 @pytest.mark.parametrize("method", ["standard", "joint"])
 def test_derivatives_run_by_programs(method, at_once, monkeypatch):
-    """Numbers by which there are some are no constants; projections remain general ones."""
+    """Numbers by which there are some are no constants; projections remain general ones.
+
+    Two beside the value in a vector, and eight in one of their own.
+    """
     by = ["bodies.cone.mass", "forces.gravity.gravity"]
+    if method == "joint":
+        by += [f"bodies.cone.{name}.{axis}" for name in ("Jp", "w") for axis in "xyz"]
 
     def slopes():
         return dap.sensitivities("pen1", by, method=method, **SETTINGS).of("cone.rdd")

@@ -200,6 +200,26 @@ def test_code_says_what_derivatives_of_results_are(count):
     assert scalar_math.slope(1.0, 0) == scalar_math.slope_count() == 0
 
 
+@compiled
+def over_seven(numbers):
+    """Numbers over a constant, and over a number of a table."""
+    for k in range(3):
+        numbers.out[k] = numbers.x[k] / 7.0
+        numbers.out[3 + k] = numbers.x[k] / numbers.inner.table[0, 0]
+
+
+@pytest.mark.parametrize("count", [7, 8])
+def test_what_has_no_slopes_divides_as_a_constant_does(count):
+    """Programs of scenes have as constants what general code loads."""
+    rng = np.random.default_rng(1)
+    one, directions = arrays(rng), rng.normal(size=(3, count))
+    one.inner.table[0, 0], directions[0] = 7.0, 0.0
+    values, slopes = differentiated_run(over_seven, one, directions)
+    assert values[:3].tobytes() == values[3:6].tobytes()
+    assert slopes[1:3].any()
+    assert np.array_equal(slopes[:3], slopes[3:6])
+
+
 def test_norms_have_values_alone():
     one = arrays(np.random.default_rng(1))
     values, slopes = differentiated_run(norm, one, np.eye(3))

@@ -150,7 +150,8 @@ class BesideWriter(Instructions):
             self._slots.add(name)
             self.out += [line, f"  {name}.d = alloca {self.vector}"]
         else:
-            self.out.append(DOUBLE.sub(f"[{self._width} x double]", f"{line}, {self._align}"))
+            wide = DOUBLE.sub(f"[{self._width} x double]", line.removesuffix(", align 8"))
+            self.out.append(f"{wide}, {self._align}")
 
     def _place(self, at: str) -> str:
         """Where the slopes of the number at an address are."""
@@ -350,13 +351,10 @@ class WithinWriter(VectorWriter, Instructions):
 
     def _quotient(self, a: str, b: str) -> None:
         """(a / b)' = (a' - (a / b) b') / b."""
-        if NUMBER.fullmatch(b):
-            a, b = self._word(a), self.splat(b)
-            self.out.append(f"  {self._name} = fdiv {self.vector} {a}, {b}")
-            return
         divisor = self._value(b)
-        value = self.number("fdiv", self._value(a), divisor)
-        rest = self.total(self._word(a), b, value, is_negative=True)
+        value, rest = self.number("fdiv", self._value(a), divisor), self._word(a)
+        if not NUMBER.fullmatch(b):
+            rest = self.total(rest, b, value, is_negative=True)
         over = self.splat(self.number("fdiv", ONE, divisor))
         self._finish(value, self.lanewise("fmul", rest, over))
 
