@@ -173,9 +173,9 @@ def slip_sharing(s: ContactArrays, begins: bool, part: float) -> bool:
     for k in range(before):
         s.active[k], s.gone[s.closed[k]] = s.closed[k], 0
     let_open(s)
-    if 0 < s.closed_count < before and put_matrix(s, begins) and begin_near(s, part):
-        if put_returning(s, -ZERO * put_sizes(s, True)) == 0:
-            return True
+    lasts = 0 < s.closed_count < before and put_matrix(s, begins) and begin_near(s, part)
+    if lasts and put_returning(s, -ZERO * put_sizes(s, True)) == 0:
+        return True
     close_active(s, before, begins)
     return begin_near(s, part) or begin_to_move(s, part, True)
 
