@@ -411,10 +411,10 @@ def test_feet_that_slide_fast_lift_and_land_without_endless_steps():
     assert result.ledger["energy"].value < 1e-10
 
 
-def gripper(pads):
+def gripper(pads, mass=0.5):
     """A box on the floor, two fingers with pads at (y, z), on a hoist that moves from 0.3 s."""
     scene = dap.Scene(name="gripper")
-    scene.add_body("box", mass=0.5, Jp=[1e-3] * 3, r=[0.0, 0.0, 0.05])
+    scene.add_body("box", mass=mass, Jp=[1e-3] * 3, r=[0.0, 0.0, 0.05])
     scene.add_body("palm", mass=2.0, Jp=[0.01] * 3, r=[0.0, 0.0, 0.3])
     scene.add_joint("tran", "lift", P_i="palm.O", P_j="ground.O", a_j="ground.z")
     scene.add_function("step", "rise", x_start=0.3, x_end=1.3, f_start=0.0, f_end=0.2)
@@ -445,6 +445,20 @@ def test_a_gripper_of_three_pads_a_finger_lifts_what_stands(integrator):
     assert abs(carried + 0.5 * (G + 0.2 * (6.0 - 12.0 * u[7:]))).max() < TOLERANCE
     assert max(abs(grip.slip).max() for grip in grips) < TOLERANCE
     assert {event.kind for event in result.events} == {"touch", "lift"}
+
+
+@pytest.mark.parametrize("mass", [1.46, 1.7])
+def test_a_gripper_slips_on_what_is_too_heavy_for_the_hoist(mass):
+    """Pads of 2 x 10 N, mu = 0.8, lift 1.46 kg slower than 1.2 m/s^2, and leave 1.7 kg standing."""
+    scene = gripper([(-0.02, -0.02), (0.02, -0.02), (0.0, 0.03)], mass)
+    result = dap.simulate(scene, t_end=0.34, dt=0.01)
+    u, a = np.clip(result.t - 0.3, 0.0, None), max(16.0 / mass - G, 0.0)
+    assert abs(result.r[:, 0, 2] - 0.05 - 0.5 * a * u**2).max() < TOLERANCE
+    slips = [event for event in result.events if event.kind == "slip"]
+    assert slips[0].t == pytest.approx(0.3, abs=1e-8)
+    assert not any("floor" in event.name for event in slips)
+    pads = [result.contact(f"{side}_grip{k}") for side in ("left", "right") for k in range(3)]
+    assert sum(pad.friction[-1, 2] for pad in pads) == pytest.approx(-16.0)
 
 
 @pytest.mark.parametrize("method", ["lsq", "joint"])

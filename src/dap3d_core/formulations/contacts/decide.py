@@ -16,7 +16,6 @@ from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.contacts.contact_table import (
     FRICTION,
     GAP,
-    NORMAL,
     REACH,
     find_grips,
     put_outputs,
@@ -233,12 +232,13 @@ def find_drive(s: ContactArrays) -> bool:
 def put_in_touch(s: ContactArrays) -> None:
     """The contacts that touch; those whose surfaces have ended are not, and leave ``ended``.
 
-    Of those that hold what ends is the force, or the reach of their surfaces.
+    Of those that hold what ends is the force, or the reach of their surfaces: a length, with which
+    no force is compared. What carries nothing has one that is rounding, below zero as well.
     """
     s.in_touch_count = 0
     for c in range(s.state.shape[0]):
         says = s.says.found[c]
-        if s.ended[c, 0] != 0 and s.was[c] > 0.5 and says[REACH] < says[NORMAL]:
+        if s.ended[c, 0] != 0 and s.was[c] > 0.5 and says[REACH] < 0.0:
             s.ended[c, 0] = s.ended[c, 1] = 0
             continue
         is_near = says[GAP] < s.limit[c] and says[REACH] >= 0.0

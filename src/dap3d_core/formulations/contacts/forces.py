@@ -223,10 +223,11 @@ def largest_entry(A: Floats, n: int) -> float:
 
 
 @compiled
-def begin_to_move(s: ContactArrays, part: float) -> bool:
+def begin_to_move(s: ContactArrays, part: float, anew: bool) -> bool:
     """Forces of closed contacts, and accelerations that are zero where they are rounding.
 
     What begins to slip has mu, not mu_s, and then others may slip as well. False if they jam.
+    anew: from zero, not from what is in ``cone.x``.
     """
     differs = False
     for k in range(s.closed_count):
@@ -234,7 +235,7 @@ def begin_to_move(s: ContactArrays, part: float) -> bool:
         s.slipping[c] = 0
         differs |= s.mu_s[c] > s.mu[c]
     while True:
-        for k in range(3 * s.closed_count):
+        for k in range(3 * s.closed_count if anew else 0):
             s.cone.x[k] = 0.0
         if not solve_forces(s, part, False):
             return False

@@ -148,11 +148,43 @@ def hold_inside(s: ContactArrays, begins: bool) -> bool:
         if 0 < s.closed_count < count and put_matrix(s, begins) and are_inside(s):
             holds = put_returning(s, -ZERO * put_sizes(s, True)) == 0
     if not holds and s.closed_count < before:
-        for k in range(before):
-            s.closed[k] = s.active[k]
-        s.closed_count = before
-        put_matrix(s, begins)
+        close_active(s, before, begins)
     return holds
+
+
+@compiled
+def close_active(s: ContactArrays, count: int, begins: bool) -> None:
+    """Let the set that is worked on be the first contacts of ``active`` again."""
+    for k in range(count):
+        s.closed[k], s.jams[s.active[k]] = s.active[k], 0
+    s.closed_count = count
+    put_matrix(s, begins)
+
+
+@compiled
+def slip_sharing(s: ContactArrays, begins: bool, part: float) -> bool:
+    """As ``begin_to_move``, of closed contacts that share, where no forces hold them inside.
+
+    Several solutions are as a rule; that is sought which is next to forces that nearly hold, and at
+    first without those that open where friction of all others holds, as of ``hold_inside``.
+    begins: as of ``put_matrix``.
+    """
+    before = s.closed_count
+    for k in range(before):
+        s.active[k], s.gone[s.closed[k]] = s.closed[k], 0
+    let_open(s)
+    lasts = 0 < s.closed_count < before and put_matrix(s, begins) and begin_near(s, part)
+    if lasts and put_returning(s, -ZERO * put_sizes(s, True)) == 0:
+        return True
+    close_active(s, before, begins)
+    return begin_near(s, part) or begin_to_move(s, part, True)
+
+
+@compiled
+def begin_near(s: ContactArrays, part: float) -> bool:
+    """As ``begin_to_move``, from forces that nearly hold."""
+    are_inside(s)
+    return begin_to_move(s, part, False)
 
 
 @compiled
@@ -291,11 +323,13 @@ def put_found(s: ContactArrays, begins: bool, inner: bool, loose: bool) -> bool:
         return False
     shares = do_share(s)
     holds = inner or (shares and not loose and hold_inside(s, begins))
-    if not holds and not begin_to_move(s, LOOSE if loose else 1.0):
+    part = LOOSE if loose else 1.0
+    slips = shares and not holds and slip_sharing(s, begins, part)
+    if not (holds or slips) and (shares or not begin_to_move(s, part, True)):
         return False
     if loose:
         holds = hold_beside_slip(s)
-        if not holds and not (put_matrix(s, False) and begin_to_move(s, LOOSE)):
+        if not holds and not (put_matrix(s, False) and begin_to_move(s, LOOSE, True)):
             return False
     if holds:
         for k in range(3 * s.closed_count):
