@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.internals import placed_shapes
-from support.plain import jit_is_on
+from support.plain import jit_is_on, long_in_plain_python
 from support.process import run
 from verification.test_stepping import ball, collide, slope, tower
 from verification.test_sticking_under_load import pendulum
@@ -68,6 +68,7 @@ def test_room_changes_no_bit(monkeypatch, name):
     assert digest(name) == usual
 
 
+@long_in_plain_python
 def test_blocks_have_the_results_of_squares(monkeypatch):
     """A tower of 120 unknowns, to rounding of the solves, but which corner carries what."""
     make, settings = CASES["tower"]
@@ -103,6 +104,7 @@ def test_numbers_that_overflow_end_a_run_in_words(v, c, words):
     assert stopped.value.result.t[0] == 0.0
 
 
+@long_in_plain_python
 def test_shapes_may_be_far_beyond_the_integers_of_cells():
     """A distance of 1e57 m; tolerance: rounding of two steps in 1000 parts at most."""
     result = dap.simulate(thrown([1e60, 0.0, 0.0]), t_end=2e-3, dt=1e-3, contact_step=1e-3)

@@ -59,6 +59,7 @@ def pendulum(motor=0.0, **friction):
     return scene
 
 
+@long_in_plain_python
 @pytest.mark.parametrize(
     ("scene", "first"),
     [(pendulum(), 1), (pendulum(4.8), 0)],
