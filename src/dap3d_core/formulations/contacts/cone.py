@@ -33,10 +33,8 @@ FIRST = 5
 PASSES, CUTS, RESIDUAL_ROUNDING = 50, 12, 1e-15
 #: Part of the longest column below which those of a pass depend on each other.
 DEPENDENT = 1e-13
-#: Of the scale of the solution: a problem counts as solved; one of slips, which have ``noise``,
-#: where another try leaves as much. What touches may be tilted by that: four corners of a box slip
-#: apart then as it turns, which no friction of theirs can stop.
-SOLVED, TILTED = 1e-12, 1e-9
+#: Of the scale of the solution: a problem counts as solved.
+SOLVED = 1e-12
 #: Parts of mobilities that are added to them; sweeps of a step, and how many steps with each.
 ADDED, CLOSER, STEPS = (1e-4, 1e-5, 1e-6), 1000, 40
 TINY = 1e-300
@@ -100,18 +98,15 @@ def solve_cone(c: Cone) -> float:
     n = 3 * c.count
     if n == 0:
         return 0.0
-    noise = largest_noise(c)
-    scale = max(stretch(c), noise / SOLVED)
-    z, left, sweeps, is_stuck = c.z[:n], np.inf, FIRST, False
+    scale = max(stretch(c), largest_noise(c) / SOLVED)
+    z, left, sweeps = c.z[:n], 0.0, FIRST
     for k in range(TRIES):
-        before = left
         sweep(c, c.K, c.q, z, sweeps)
         sweeps = 4 * sweeps if k > 0 else SWEEPS
         left = newton(c, c.K, c.q, z, scale)
-        is_stuck = noise > 0.0 and 0.5 * before < left <= TILTED * scale
-        if left <= SOLVED * scale or is_stuck:
+        if left <= SOLVED * scale:
             break
-    if not (left <= SOLVED * scale or is_stuck):
+    if not left <= SOLVED * scale:
         left = come_nearer(c, left, scale)
     largest = 0.0
     for k in range(n):
