@@ -275,16 +275,13 @@ def stop(s: ContactArrays, system: System) -> None:
 
     At a dead centre it passes through zero while the mechanism moves on.
     """
-    own, count = s.lam_free.shape[0], 0
+    count = 0
     for c in range(s.state.shape[0]):
         is_stopped = False
         if s.stops[c] != 0:
             largest, of_free = 0.0, 0.0
             for i in range(3 * c, 3 * c + 3):
-                square, row = 0.0, s.scaled[own + i]
-                for k in range(row.shape[0]):
-                    square += row[k] * row[k]
-                largest, of_free = max(largest, s.W[i, i]), max(of_free, square)
+                largest, of_free = max(largest, s.W[i, i]), max(of_free, free_mobility(s, i))
             is_stopped = largest >= DEAD * of_free
         for i in range(3):
             if s.was[c] == 2.0 or is_stopped or (s.was[c] == 1.0 and i == 0):
@@ -296,6 +293,15 @@ def stop(s: ContactArrays, system: System) -> None:
 
 
 @compiled
+def free_mobility(s: ContactArrays, row: int) -> float:
+    """Mobility of a row of the contacts if there were no joints."""
+    square, scaled = 0.0, s.scaled[s.lam_free.shape[0] + row]
+    for k in range(scaled.shape[0]):
+        square += scaled[k] * scaled[k]
+    return square
+
+
+@compiled
 def stop_what_rests(s: ContactArrays, system: System) -> None:
     """Stop what rounds of impacts leave of the rates of what touches: slip as slow as at rest, too.
 
@@ -304,6 +310,8 @@ def stop_what_rests(s: ContactArrays, system: System) -> None:
     count = 0
     for k in range(s.in_touch_count):
         c = s.in_touch[k]
+        if not is_pressed(s, c, s.in_touch, s.in_touch_count):
+            continue
         slips = size_across(s, c, s.slip[c]) > still_speed(s, c)
         for i in range(3 if abs(s.closing[c]) <= AT_REST * s.length[c] else 0):
             if not slips or (i == 0 and s.gapless[c] == 0.0):
@@ -314,10 +322,17 @@ def stop_what_rests(s: ContactArrays, system: System) -> None:
 
 @compiled
 def change_rates(s: ContactArrays, count: int, system: System) -> None:
-    """Change the rates of so many ``rows`` by what is ``right``, with the joints held."""
-    found = False
-    for i in range(count):
-        found |= s.right[i] != 0.0
+    """Change the rates of so many ``rows`` by what is ``right``, with the joints held.
+
+    Those that the joints hold have mobilities and rates of rounding, and their ratio is no impulse.
+    """
+    found, given, count = False, count, 0
+    for k in range(given):
+        row = s.rows[k]
+        if s.W[row, row] >= DEAD * free_mobility(s, row):
+            s.rows[count], s.right[count] = row, s.right[k]
+            found |= s.right[k] != 0.0
+            count += 1
     if not found:
         return
     for i in range(count):
@@ -336,13 +351,11 @@ def leave_movable(t: float, s: ContactArrays, system: System, loops: Any, functi
 
     False if one closes, ``culprit``, and joints prescribe that.
     """
-    own, count = s.lam_free.shape[0], 0
+    count = 0
     for k in range(s.in_touch_count):
         c = s.in_touch[k]
-        square, row, least = 0.0, s.scaled[own + 3 * c], -AT_REST * s.length[c]
-        for q in range(row.shape[0]):
-            square += row[q] * row[q]
-        if s.alone[c] != 0 or s.W[3 * c, 3 * c] > HELD * square:
+        least = -AT_REST * s.length[c]
+        if s.alone[c] != 0 or s.W[3 * c, 3 * c] > HELD * free_mobility(s, 3 * c):
             s.in_touch[count] = c
             count += 1
             continue

@@ -269,10 +269,10 @@ def let_leave(s: ContactArrays, count: int) -> None:
             else:
                 s.closed[s.closed_count] = c
                 s.closed_count += 1
-        without = s.closed_count
-        for k in range(3 * without):
+        for k in range(3 * s.closed_count):
             s.cone.x[k] = 0.0
-        holds = put_matrix(s, True) and solve_forces(s, 1.0, False)
+        holds = put_matrix(s, True) and solve_without(s)
+        without = s.closed_count
         if not holds or put_returning(s, -ZERO * big) > 0:
             if not holds or without > 0:
                 for k in range(before):
@@ -288,6 +288,22 @@ def let_leave(s: ContactArrays, count: int) -> None:
             c = s.closed[k]
             leaves[c] = s.alone[c] == 0 and s.cone.x[3 * k] <= ZERO * largest
             count += leaves[c]
+
+
+@compiled
+def solve_without(s: ContactArrays) -> bool:
+    """Forces of what is left closed, without what leaves; False if there are none.
+
+    Those that share have the forces that ``put_found`` would give them: with others what leaves
+    might be back at once, and carry nothing where it is held.
+    """
+    if not do_share(s):
+        return solve_forces(s, 1.0, False)
+    if not hold_inside(s, True):
+        return slip_sharing(s, True, 1.0)
+    for k in range(3 * s.closed_count):
+        s.cone.x[k] = s.inner[k]
+    return True
 
 
 @compiled
