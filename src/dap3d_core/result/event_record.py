@@ -31,7 +31,8 @@ class EventRecord:
         u: (13 n) the state, of events and before jumps; None for switches.
         changes: force -> field -> new value of changed parameters.
         u_after: (13 n) the state after a jump of velocities; None for all else.
-        work: of the impulses of a jump, with those of drivers, J.
+        work: of the impulses of a jump, with those of drivers, J; of an impact also of what
+            resists rolling and spinning there.
         states: element -> state -> value of states of elements that a jump has changed.
     """
 

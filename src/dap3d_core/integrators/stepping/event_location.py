@@ -146,12 +146,15 @@ def is_cut_at_sample(work: IntegrationState, t: float) -> bool:
     """``is_sample_across`` once the values of the sample are known.
 
     Not of what is UNSEEN: where a function takes another form it is smooth: a step may mix both.
-    Nor of contacts that begin in their band, as one that opens does: an early stage, an Euler step,
-    errs by the curvature of what slides, the end does not.
+    Nor of contacts that begin in their band and by their rates would still be there, as one that
+    opens does: an early stage, an Euler step, errs by the curvature of what slides, the end does
+    not. One that bounces may be back, and away again at the end.
     """
-    s = work.switches
+    s, h = work.switches, t - work.t
     for k in range(s.shape[1]):
-        if s[at.DOES, k] == UNSEEN or (s[at.DOES, k] == MODE_ENDS and may_rest(s, k)):
+        moved = h * s[at.SIDE, k] * s[at.RATE, k]
+        rests = s[at.DOES, k] == MODE_ENDS and may_rest(s, k) and moved < 2.0 * s[at.BAND, k]
+        if s[at.DOES, k] == UNSEEN or rests:
             s[at.SAMPLE, k] = s[at.SIDE, k]
     if not changes_sign(s, at.SAMPLE):
         return False

@@ -304,9 +304,11 @@ class ContactJumps(Jumps):
         if work > max(LOSSLESS * s.exchanged, self._gain[0]) and np.any(s.newton[struck]):
             self._gain = (work, t, ", ".join(table.names[c] for c in struck))
         self._take_decided(integration, work)
-        after = self._after(u)
+        after, works = self._after(u), s.work.copy()
+        resisting = np.flatnonzero(table.under >= 0)
+        np.add.at(works, table.under[resisting], s.work[resisting])
         for c in struck.tolist():
-            self._note(c, t, "impact", u, after, float(s.work[c]))
+            self._note(c, t, "impact", u, after, float(works[c]))
         for c in np.flatnonzero(s.rests_soon).tolist():
             self._note(c, t + float(s.rest_time[c]), "rest")
         for c in np.flatnonzero(s.was != s.mode).tolist():
