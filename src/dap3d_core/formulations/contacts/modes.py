@@ -23,8 +23,9 @@ from dap3d_core.kernels.runtime.cache import compiled
 #: Part of its cone in which friction of contacts that share stays where they begin to slip: what it
 #: leaves shows which of them do, and where to.
 LOOSE = 1.0 - 1e-6
-#: Part of its mobility that friction leaves a contact whose steps become endless: it jams.
-NEARLY = 1e-2
+#: Part of its mobility that friction leaves a contact whose steps become endless: it jams; and
+#: where time resolves them no more.
+NEARLY, AT_FLOOR = 1e-2, 1e-1
 #: Part of the largest force that is to be left for a contact that stays as others can carry less;
 #: and for one that is at the end of its cone: with less it would be there again at once.
 TO_STAY, TO_STICK = 1e-6, 1e-3
@@ -421,10 +422,11 @@ def put_one(s: ContactArrays, k: int, shares: bool, is_one: bool, least: float) 
 
 
 @compiled
-def nearly_jams(s: ContactArrays) -> int:
+def nearly_jams(s: ContactArrays, part: float) -> int:
     """A contact whose friction leaves next to nothing of how it gives way; -1 of none.
 
     Of those that touch: its normal force grows beyond all bounds there, in a finite time.
+    part: of its mobility, which is next to nothing.
     """
     s.closed_count = 0
     for k in range(s.touching_count):
@@ -435,6 +437,6 @@ def nearly_jams(s: ContactArrays) -> int:
     put_matrix(s, False)
     for k in range(s.closed_count):
         c = s.closed[k]
-        if s.slides[c] != 0 and s.cone.A[3 * k, 3 * k] < NEARLY * s.W[3 * c, 3 * c]:
+        if s.slides[c] != 0 and s.cone.A[3 * k, 3 * k] < part * s.W[3 * c, 3 * c]:
             return c
     return -1

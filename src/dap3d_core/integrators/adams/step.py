@@ -305,7 +305,7 @@ def step(work: AdamsState, functions: Any, system: Any, loops: Any) -> None:
     update_coefficients(work, h, k)
     predict(work, h, k)
     trial, table = work.state[at.TRIAL], work.table
-    if work.switch_count != 0 and is_sample_across(work, t1, trial, watch, system, loops):
+    if work.switch_count != 0 and is_sample_across(work, t1, t1 - t, trial, watch, system, loops):
         return
     rates, change = work.scaled[ROWS - 1], work.state[at.SCRATCH]
     work.rhs_count += 1

@@ -180,7 +180,7 @@ def stage_is_across(
     for i in range(work.stages - 1):
         for k in range(x.shape[0]):
             x[k] = work.state[at.Y, k] + work.Z[i, k]
-        if is_sample_across(work, t + c[i] * h, x, watch, system, loops):
+        if is_sample_across(work, t + c[i] * h, h, x, watch, system, loops):
             return True
     return False
 

@@ -266,7 +266,7 @@ def take_stages(
                 x = work.state[at.SCRATCH]
                 if cut_at_stage(work, t, t1):
                     return False
-            if watched and is_sample_across(work, t, x, watch, system, loops):
+            if watched and is_sample_across(work, t, h, x, watch, system, loops):
                 return False
             work.rhs_count += 1
             rhs(t, x, k[i], system, loops)
@@ -438,7 +438,7 @@ def take_dense_stages(
             project_stage(work, instant, argument, project, system, loops)
             if cut_at_stage(work, instant, t1):
                 return False
-        if watched and is_sample_across(work, instant, argument, watch, system, loops):
+        if watched and is_sample_across(work, instant, t1 - t, argument, watch, system, loops):
             return False
         rhs(instant, argument, k[i], system, loops)
     return True

@@ -8,7 +8,8 @@ step mixes two laws, and the location needs no dense output, which would mix the
 1. values and rates at both ends of the last step predict it: the step ends shortly before
    (``distance_to_crossing``); each such step brings it some thousand times nearer;
 2. an attempt with a sample on the other side is cut to where a parabola through that sample leads
-   (``cut_step``); a cubic through both ends shows a switch that changes its sign twice in a step;
+   (``cut_step``); a polynomial through both ends and a sample between them shows a switch that
+   changes its sign twice in a step;
 3. the rest is an Euler step, so short that its error is below rounding: in it the instant is found
    by bisection, to the last digit of time (``bisect_crossing``). The state goes to the far side,
    the integration starts anew; where the switch ends the run, the state stays on the near side.
@@ -55,9 +56,9 @@ MAX_STALLS_AT_ZERO = 10
 CUT_SHORT = 1e-3
 #: A change of a switch by this part of its band is rounding.
 SAME = 1.0 / 32.0
-#: Attempts in a row that may be cut because a cubic, and no sample, shows two crossings; and the
-#: error of the cubic, as a part of its drop: of a sine 5 % in a step of 1.5 rad, 20 % in one of 3.
-MAX_SUSPICIONS, CUBIC_ERROR = 8, 0.25
+#: Attempts in a row that may be cut because a polynomial, and no sample, shows two crossings; its
+#: values in a step that are compared; and the error of a cubic, as a part of its drop: of a sine 5 % in a step of 1.5 rad, 20 % in one of 3.
+MAX_SUSPICIONS, PLACES, CUBIC_ERROR = 8, 16, 0.25
 #: Newton steps for derivatives of an instant; each leaves the error of the rate, 1e-4 as a rule.
 CROSSING_PASSES = 4
 #: A switch that changes its sign more often than this while time advances by less than this part of
@@ -74,7 +75,7 @@ def next_length(
 
     slope: dy/dt at the state.
     """
-    longest = min(end, work.step_limit) - work.t
+    longest, work.middle_part = min(end, work.step_limit) - work.t, 0.0
     h = min(longest, with_slopes(work.step_limit_at_switch, 0.0))
     short = max(EULER_STEP_FRACTION * usual_step(work), 4.0 * FLOOR * time_span(work))
     short = with_slopes(short, 0.0)  # as all lengths that are chosen
@@ -132,17 +133,17 @@ def distance_to_crossing(work: IntegrationState, h: float, short: float) -> floa
 
 @compiled
 def is_sample_across(
-    work: IntegrationState, t: float, x: Floats, watch: Function, system: Any, loops: Any
+    work: IntegrationState, t: float, h: float, x: Floats, watch: Function, system: Any, loops: Any
 ) -> bool:
-    """True if a state within a step lies across a switch; then the step is cut."""
+    """True if a state within a step of length h lies across a switch; then the step is cut."""
     if work.sampled_switch_count == 0:
         return False
     evaluate(work, t, x, at.SAMPLE, watch, system, loops)
-    return is_cut_at_sample(work, t)
+    return is_cut_at_sample(work, t, h)
 
 
 @compiled
-def is_cut_at_sample(work: IntegrationState, t: float) -> bool:
+def is_cut_at_sample(work: IntegrationState, t: float, length: float) -> bool:
     """``is_sample_across`` once the values of the sample are known.
 
     Not of what is UNSEEN: where a function takes another form it is smooth: a step may mix both.
@@ -151,6 +152,10 @@ def is_cut_at_sample(work: IntegrationState, t: float) -> bool:
     not. One that bounces may be back, and away again at the end.
     """
     s, h = work.switches, t - work.t
+    if h < length and abs(h / length - 0.5) <= abs(work.middle_part - 0.5):
+        work.middle_part = with_slopes(h / length, 0.0)
+        for k in range(s.shape[1]):
+            s[at.MIDDLE, k] = s[at.SAMPLE, k]
     for k in range(s.shape[1]):
         moved = h * s[at.SIDE, k] * s[at.RATE, k]
         rests = s[at.DOES, k] == MODE_ENDS and may_rest(s, k) and moved < 2.0 * s[at.BAND, k]
@@ -199,8 +204,9 @@ def end_is_across(
     part = 1.0
     for k in range(s.shape[1]):
         side = s[at.SIDE, k]
-        low = cubic_minimum(side * s[at.VALUE, k], h * side * s[at.RATE, k], side * s[at.FOUND, k],
-                            h * side * s[at.FOUND_RATE, k])  # fmt: skip
+        low = lowest_between(side * s[at.VALUE, k], h * side * s[at.RATE, k], side * s[at.FOUND, k],
+                             h * side * s[at.FOUND_RATE, k], work.middle_part,
+                             side * s[at.MIDDLE, k])  # fmt: skip
         if low < part:
             part, work.near_switch = low, k
     if part == 1.0:
@@ -209,6 +215,32 @@ def end_is_across(
     work.rejected_count += 1
     work.step_limit_at_switch = part * h
     return True
+
+
+@compiled
+def lowest_between(a: float, b: float, c: float, d: float, part: float, middle: float) -> float:
+    """As ``cubic_minimum``, of the quartic that has also the value ``middle`` at a part of the step.
+
+    What depends on the motion of a body that turns bends otherwise than by its ends: a ball beside
+    the edge of a box came and left in a step of radau, and the cubic missed three quarters of it.
+    """
+    weight = part * part * (1.0 - part) * (1.0 - part)
+    if weight == 0.0:
+        return cubic_minimum(a, b, c, d)
+    p2, p3 = 3.0 * (c - a) - 2.0 * b - d, b + d - 2.0 * (c - a)
+    p4 = (middle - a - part * (b + part * (p2 + part * p3))) / weight
+    between = 0.5 * (a + c) + (b - d) / 6.0 + p4 / 6.0
+    if min(a + 0.25 * b, c - 0.25 * d, between) > 0.0:  # of Bezier's points none is across
+        return 1.0
+    low, high, top, x = min(a, c), a, a, 1.0
+    for k in range(1, PLACES):
+        at_k = k / PLACES
+        left = at_k * (1.0 - at_k)
+        value = a + at_k * (b + at_k * (p2 + at_k * p3)) + p4 * left * left
+        top = max(top, value)
+        if value < low:
+            low, high, x = value, top, at_k
+    return 1.0 if low >= (1.0 if b > 0.0 else CUBIC_ERROR) * (min(high, c) - low) else x
 
 
 @compiled

@@ -176,7 +176,7 @@ class Integration(Restorable):
             crossings=np.zeros((at.LOGGED if count else 0, 3)),
             tolerance=tolerance_of(y.size, atol, kinds),
             stops=stop_table(stops, is_adaptive=step is None),
-            limits=np.full(1, np.inf),
+            limits=np.array([np.inf, 0.0]),
             **self.own_arrays(y.size, length_count),
         )
         work = self.work

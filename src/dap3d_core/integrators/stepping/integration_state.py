@@ -48,13 +48,13 @@ BEFORE, INSTANT, BEHIND, STOP_ROWS = range(4)
 # may be off by for that, first of the components that are of the same kind (rounding.py).
 ABSOLUTE, NOISE, MOST, KIND, TOLERANCES = range(5)
 # Rows of ``switches``: value, side (the sign that it keeps; 0: none yet), rate and bend (change of
-# the rate in time) at t; value and rate at the trial state; value at a sample; what it does
-# (assembly.system); how far beyond zero it is left on its side; since when its changes are counted,
+# the rate in time) at t; value and rate at the trial state; value at a sample, and at the one
+# nearest to the middle of the step; what it does (assembly.system); how far beyond zero it is left on its side; since when its changes are counted,
 # and how many there were; to which side it has just gone, where velocities jump for that.
 (
-    VALUE, SIDE, RATE, BEND, FOUND, FOUND_RATE, SAMPLE, DOES, BAND, SINCE, COUNT, CROSSED,
+    VALUE, SIDE, RATE, BEND, FOUND, FOUND_RATE, SAMPLE, MIDDLE, DOES, BAND, SINCE, COUNT, CROSSED,
     SWITCH_ROWS
-) = range(13)  # fmt: skip
+) = range(14)  # fmt: skip
 #: Rows of ``crossings``, the first ones of a run: time, which switch, to which side.
 LOGGED = 1000
 
@@ -152,6 +152,7 @@ class IntegrationState(Arrays):
 
     # found anew before each step
     step_limit = Scalar[float]("limits")  # no step goes beyond: t_limit, or the next stop
+    middle_part = Scalar[float]("limits")  # of a step, where its switches are as in MIDDLE; 0: none
 
     real: Floats  # (MEASURES + m,) scalars; m singularity measures that project gives
     integer: Integers  # scalars

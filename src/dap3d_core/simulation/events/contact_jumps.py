@@ -24,7 +24,7 @@ from dap3d_core.formulations.contacts.decide import (
     repeat,
 )
 from dap3d_core.formulations.contacts.impacts import ROUNDS, TOUCHING
-from dap3d_core.formulations.contacts.modes import nearly_jams
+from dap3d_core.formulations.contacts.modes import AT_FLOOR, NEARLY, nearly_jams
 from dap3d_core.formulations.contacts.rows import follow_joints, keep_velocities, meet, put_rows
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators import Integration, Status
@@ -150,8 +150,9 @@ class ContactJumps(Jumps):
         """
         steps, t = integration.statistics.steps, integration.t
         (before, since), span = self._stood, self._span_of(integration)
-        is_slow = integration.status is Status.STIFF
-        is_stalled = is_slow or (integration.status is Status.STALLED and not integration.implicit)
+        is_slow, is_at_floor = (integration.status is s for s in (Status.STIFF, Status.STEP_FLOOR))
+        stalls = integration.status is Status.STALLED and not integration.implicit
+        is_stalled = is_slow or is_at_floor or stalls
         if not is_stalled and (t - since > SLOW * span or steps < before):
             self._stood = (steps, t)
         elif is_stalled or steps - before > MOST_STEPS:
@@ -162,13 +163,13 @@ class ContactJumps(Jumps):
             sliding = np.where(modes == 1.0, slip, np.inf)
             closed = np.flatnonzero(modes > 0.5).tolist()
             s.touching[: len(closed)], s.touching_count = closed, len(closed)
-            s.jammed = nearly_jams(s)
+            s.jammed = nearly_jams(s, AT_FLOOR if is_at_floor else NEARLY)
             if s.jammed >= 0:
                 self._stood, integration.work.status = (steps, t), Status.JUMPED
                 return
             if is_slow and not np.any(sliding < STIFF_SLIP):
                 integration.work.status = Status.RUNNING
-            if is_slow or not closed:
+            if is_slow or is_at_floor or not closed:
                 return
             names = [self.table.names[c] for c in closed]
             slowest = (
