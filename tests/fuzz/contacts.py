@@ -236,14 +236,16 @@ def check_newton(scene, result):
 def check_energy(scene, result, exact):
     """No contact gives energy, nor does what is between them.
 
-    Drivers do, and Newton's law of impacts beside friction (Kane and Levinson, Dynamics, 1985), of
-    which a note tells.
+    Drivers do, and Newton's law of impacts beside friction (Kane and Levinson, Dynamics, 1985), and
+    beside other laws or e, of which a note tells.
     """
     energy, given = result.energy.total, result.energy.potential
     size = np.max(np.abs(result.energy.kinetic)) + np.ptp(given) + 9.81 * len(scene.bodies)
     driven = any(joint.type.startswith("drive") for joint in scene.joints.values())
     laws = [contact.fields for contact in scene.contacts.values()]
-    gains = any(law.get("law") == "newton" for law in laws) and any(law["mu"] > 0.0 for law in laws)
+    words, sizes = ({law.get(key) for law in laws} for key in ("law", "e"))
+    mixes = len(words) > 1 or len(sizes) > 1 or any(law["mu"] > 0.0 for law in laws)
+    gains = "newton" in words and mixes
     if not driven and not gains:
         assert np.max(np.diff(energy), initial=0.0) <= GAIN * exact * size
         work = collections.Counter()
