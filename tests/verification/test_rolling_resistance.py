@@ -75,6 +75,17 @@ def by_events(scene, t_end, **settings):
     return dap.simulate(scene, t_end=t_end, **(tight | settings))
 
 
+def test_work_of_an_impact_is_what_it_takes_of_kinetic_energy():
+    """With the moments that resist: friction alone gives energy, as they turn the ball back."""
+    scene = ball(True, v=-0.8, w=[5.0, -8.0, -9.0], mu_roll=0.02, mu_spin=0.001, e=1.0)
+    scene.bodies["ball"].r_dot = (-0.8, -0.6, -2.0)
+    impact = next(e for e in by_events(scene, 0.1).events if e.kind == "impact")
+    v, w = (np.array([u[7:10], u[10:13]]) for u in (impact.u, impact.u_after))
+    before, after = (0.5 * (M * x[0] @ x[0] + I * x[1] @ x[1]) for x in (v, w))
+    assert impact.work == pytest.approx(after - before, rel=1e-12)
+    assert impact.work < 0.0
+
+
 def instants(result, name):
     """Where one sticks, by its name."""
     return [event.t for event in result.events if (event.kind, event.name) == ("stick", name)]

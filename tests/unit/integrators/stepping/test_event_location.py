@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dap3d_core.integrators.stepping.event_location import cubic_minimum
+from dap3d_core.integrators.stepping.event_location import cubic_minimum, lowest_between
 
 
 def test_a_dip_behind_a_rise_is_seen():
@@ -22,3 +22,22 @@ def test_what_is_clear_of_zero_is_passed():
     p = np.polynomial.Polynomial([1.0, 1.0, -3.0, 2.3])
     d = p.deriv()
     assert cubic_minimum(p(0.0), d(0.0), p(1.0), d(1.0)) == 1.0
+
+
+def test_a_dip_that_the_ends_do_not_show_is_seen_by_a_sample():
+    """As of a ball beside the edge of a box: by its ends the least gap is clear of zero."""
+    p = np.polynomial.Polynomial([0.0102, -0.0503, 0.0758, 0.1019])
+    p += -0.34 * np.polynomial.Polynomial([0.0, 0.0, 1.0, -2.0, 1.0])
+    d = p.deriv()
+    ends = p(0.0), d(0.0), p(1.0), d(1.0)
+    assert cubic_minimum(*ends) == 1.0
+    x = lowest_between(*ends, 0.645, p(0.645))
+    assert p(x) < 0.0
+    assert x == pytest.approx(next(r.real for r in d.roots() if 0.0 < r.real < 1.0), abs=1.0 / 16.0)
+    higher = ends[0] + 0.05, ends[1], ends[2] + 0.05, ends[3]
+    assert lowest_between(*higher, 0.645, p(0.645) + 0.05) == 1.0
+
+
+def test_without_a_sample_between_the_ends_count():
+    ends = 0.0, 1.0, 0.3, 1.9
+    assert lowest_between(*ends, 0.0, 0.0) == cubic_minimum(*ends) < 1.0
