@@ -57,7 +57,8 @@ CUT_SHORT = 1e-3
 #: A change of a switch by this part of its band is rounding.
 SAME = 1.0 / 32.0
 #: Attempts in a row that may be cut because a polynomial, and no sample, shows two crossings; its
-#: values in a step that are compared; and the error of a cubic, as a part of its drop: of a sine 5 % in a step of 1.5 rad, 20 % in one of 3.
+#: values in a step that are compared; and the error of a cubic, as a part of its drop: of a sine
+#: 5 % in a step of 1.5 rad, 20 % in one of 3.
 MAX_SUSPICIONS, PLACES, CUBIC_ERROR = 8, 16, 0.25
 #: Newton steps for derivatives of an instant; each leaves the error of the rate, 1e-4 as a rule.
 CROSSING_PASSES = 4
@@ -219,7 +220,7 @@ def end_is_across(
 
 @compiled
 def lowest_between(a: float, b: float, c: float, d: float, part: float, middle: float) -> float:
-    """As ``cubic_minimum``, of the quartic that has also the value ``middle`` at a part of the step.
+    """As ``cubic_minimum``, of the quartic that also has the value ``middle`` within, at ``part``.
 
     What depends on the motion of a body that turns bends otherwise than by its ends: a ball beside
     the edge of a box came and left in a step of radau, and the cubic missed three quarters of it.

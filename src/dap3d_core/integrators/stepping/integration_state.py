@@ -49,8 +49,9 @@ BEFORE, INSTANT, BEHIND, STOP_ROWS = range(4)
 ABSOLUTE, NOISE, MOST, KIND, TOLERANCES = range(5)
 # Rows of ``switches``: value, side (the sign that it keeps; 0: none yet), rate and bend (change of
 # the rate in time) at t; value and rate at the trial state; value at a sample, and at the one
-# nearest to the middle of the step; what it does (assembly.system); how far beyond zero it is left on its side; since when its changes are counted,
-# and how many there were; to which side it has just gone, where velocities jump for that.
+# nearest to the middle of the step; what it does (assembly.system); how far beyond zero it is left
+# on its side; since when its changes are counted, and how many there were; to which side it has
+# just gone, where velocities jump for that.
 (
     VALUE, SIDE, RATE, BEND, FOUND, FOUND_RATE, SAMPLE, MIDDLE, DOES, BAND, SINCE, COUNT, CROSSED,
     SWITCH_ROWS
