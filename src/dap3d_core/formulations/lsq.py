@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, System
-from dap3d_core.assembly.evaluate import global_accelerations, largest, rates, state_rates, zero
+from dap3d_core.assembly.evaluate import global_accelerations, largest, put_rates, zero
 from dap3d_core.formulations.common import constraints
 from dap3d_core.formulations.common.constraints import (
     PART,
@@ -98,10 +98,7 @@ def null_space_component(system: System, n: Floats, e: float) -> float:
 @compiled
 def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """dy/dt of a state, the power of forces and drivers last."""
-    power = accelerate(t, y, system, loops)
-    rates(y, system.metric, system.acceleration, out)
-    state_rates(t, out, system, loops)
-    out[out.shape[0] - 1] = power
+    put_rates(t, y, accelerate(t, y, system, loops), out, system, loops)
 
 
 @compiled

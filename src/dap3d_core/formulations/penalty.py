@@ -14,11 +14,11 @@ from typing import Any
 from dap3d_core.assembly.arrays import ALPHA, MU, OMEGA, WRENCH, Floats, System
 from dap3d_core.assembly.evaluate import (
     call_kinds,
+    copy,
     global_accelerations,
     place,
-    rates,
+    put_rates,
     scale_forces,
-    state_rates,
     zero,
 )
 from dap3d_core.formulations.common import constraints
@@ -41,8 +41,7 @@ from dap3d_core.linear.ldlt.factor import assemble, factor, regularise
 @compiled
 def solve(system: System) -> None:
     """``acceleration`` and ``multipliers`` from scaled forces, gamma' in ``right_side``."""
-    for k in range(system.right_side.shape[0]):
-        system.multipliers[k] = system.right_side[k]
+    copy(system.multipliers, system.right_side)
     solve_rows(system, system.acceleration)
 
 
@@ -74,10 +73,7 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
 @compiled
 def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """dy/dt of a state, the power of forces and drivers last."""
-    power = accelerate(t, y, system, loops)
-    rates(y, system.metric, system.acceleration, out)
-    state_rates(t, out, system, loops)
-    out[out.shape[0] - 1] = power
+    put_rates(t, y, accelerate(t, y, system, loops), out, system, loops)
 
 
 @compiled

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import EVEN, Floats, System
-from dap3d_core.assembly.evaluate import largest, zero
+from dap3d_core.assembly.evaluate import copy, largest, zero
 from dap3d_core.formulations.common.constraints import (
     PART,
     acceleration_residual,
@@ -51,8 +51,7 @@ def solve(system: System) -> None:
         if not left < FALLING * before:
             break
         add_pass(system)
-    for k in range(system.total.shape[0]):
-        system.multipliers[k] = system.total[k]
+    copy(system.multipliers, system.total)
     if has_friction(system):
         least_multipliers(system)
 
@@ -68,8 +67,7 @@ def least_multipliers(system: System) -> None:
     K, n, rows = system.K, system.right_side, system.total.shape[0]
     last = system.friction.shape[0] - K.shape[0]
     w, kept = system.friction[last - rows : last], system.friction[last:]
-    for k in range(K.shape[0]):
-        kept[k] = K[k]
+    copy(kept, K)
     weigh_rows(system.blocks, system.D, 1.0, system.compliance)
     e = LEAST_PART * largest(system.compliance) / largest(w)
     for k in range(rows):
@@ -77,8 +75,7 @@ def least_multipliers(system: System) -> None:
     limit, smallest = SEEN * largest(system.total), SMALLEST * e
     while take_seen(system, n, w, e) > limit and e > smallest:
         e *= SMALLER
-    for k in range(K.shape[0]):
-        K[k] = kept[k]
+    copy(K, kept)
     for k in range(rows):
         system.multipliers[k] = system.total[k] - n[k]
 
@@ -113,8 +110,7 @@ def take_seen(system: System, n: Floats, w: Floats, e: float) -> float:
 def add_pass(system: System) -> None:
     """Solve for what the accelerations leave of the rows; ``total`` takes the change of -lambda."""
     multipliers, total = system.multipliers, system.total
-    for k in range(total.shape[0]):
-        multipliers[k] = system.gamma[k]
+    copy(multipliers, system.gamma)
     solve_rows(system, system.acceleration)
     for k in range(total.shape[0]):
         total[k] += multipliers[k]

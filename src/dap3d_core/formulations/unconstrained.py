@@ -7,8 +7,7 @@ from dap3d_core.assembly.evaluate import (
     call_kinds,
     evaluate_forces,
     global_accelerations,
-    rates,
-    state_rates,
+    put_rates,
 )
 from dap3d_core.assembly.state_update import normalise
 from dap3d_core.kernels.runtime.cache import compiled
@@ -17,10 +16,7 @@ from dap3d_core.kernels.runtime.cache import compiled
 @compiled
 def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """dy/dt of a state, the power of the forces last."""
-    power = evaluate_forces(t, y, system, loops)
-    rates(y, system.metric, system.acceleration, out)
-    state_rates(t, out, system, loops)
-    out[out.shape[0] - 1] = power
+    put_rates(t, y, evaluate_forces(t, y, system, loops), out, system, loops)
 
 
 @compiled

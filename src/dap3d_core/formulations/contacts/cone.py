@@ -21,6 +21,7 @@ Dense, for as many contacts as touch in one place.
 import attrs
 import numpy as np
 
+from dap3d_core.assembly.evaluate import copy, zero
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import Arrays, Matrix, Scalar
 from dap3d_core.kernels.runtime.cache import compiled
@@ -152,8 +153,7 @@ def come_nearer(c: Cone, left: float, scale: float) -> float:
     """Come nearer to a solution z by problems that are firmer; the residual."""
     n = 3 * c.count
     y, z, new, firm, moved = c.y[:n], c.z[:n], c.new[:n], c.firm, c.moved
-    for k in range(n):
-        y[k] = 0.0
+    zero(y)
     for part in ADDED:
         for _ in range(STEPS):
             total = 0.0
@@ -162,19 +162,16 @@ def come_nearer(c: Cone, left: float, scale: float) -> float:
             if (left <= SOLVED * scale) | (not total < np.inf):
                 return left
             for i in range(n):
-                for k in range(n):
-                    firm[i, k] = c.K[i, k]
+                copy(firm[i][:n], c.K[i])
                 firm[i, i] += part * c.K[i, i]
                 moved[i] = c.q[i] - part * c.K[i, i] * y[i]
             sweep(c, firm, moved, y, CLOSER)
             newton(c, firm, moved, y, scale)
-            for k in range(n):
-                new[k] = y[k]
+            copy(new, y)
             rest = newton(c, c.K, c.q, new, scale)
             if rest < left:
                 left = rest
-                for k in range(n):
-                    z[k] = new[k]
+                copy(z, new)
     return left
 
 
@@ -276,8 +273,7 @@ def newton(c: Cone, A: Floats, b: Floats, x: Floats, scale: float) -> float:
         if not size < best:
             break
         best = size
-        for k in range(n):
-            x[k] = c.trial[k]
+        copy(x, c.trial[:n])
     return best
 
 

@@ -10,7 +10,7 @@ coordinates.
 from typing import Any
 
 from dap3d_core.assembly.arrays import System
-from dap3d_core.assembly.evaluate import place, place_states
+from dap3d_core.assembly.evaluate import place, place_states, zero
 from dap3d_core.formulations import REPORT
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.contacts.contact_table import (
@@ -20,6 +20,7 @@ from dap3d_core.formulations.contacts.contact_table import (
     find_grips,
     put_outputs,
 )
+from dap3d_core.formulations.contacts.equations import NEAR, WAY
 from dap3d_core.formulations.contacts.forces import put_slip_against, size_across, still_speed
 from dap3d_core.formulations.contacts.impacts import (
     AT_REST,
@@ -61,8 +62,6 @@ DEEPER = 100.0
 #: What was decided, or why nothing is: joints prescribe that a contact closes, friction jams,
 #: bodies overlap at the start, friction would drive, an impact has no impulses.
 DECIDED, PRESCRIBED, JAMMED, OVERLAPS, DRIVES, WEDGED = 0, 1, 2, 3, 4, 5
-#: Places of a mode, the direction of sliding and the share among the states of elements.
-MODE, WAY, NEAR = 0, 1, 4
 
 
 @compiled
@@ -154,8 +153,7 @@ def repeat(
         s.role[c], s.values[c] = s.mode[c] > 0.5, s.closing[c]
     lift(s)
     change(s, system)
-    for k in range(s.moved.shape[0]):
-        s.moved[k] = 0.0
+    zero(s.moved)
     are_same = not slide_sharing(s) or share_anew(t, s, system, loops, functions, tensions)
     for c in range(s.mode.shape[0]):
         size = size_across(s, c, s.slip[c])
@@ -204,7 +202,7 @@ def remember_modes(s: ContactArrays, system: System) -> None:
     """Modes before the instant."""
     place_states(s.y, system)
     for c in range(s.state.shape[0]):
-        s.was[c] = system.states[s.state[c] + MODE]
+        s.was[c] = system.states[s.state[c]]
 
 
 @compiled
@@ -457,7 +455,7 @@ def put_state(s: ContactArrays, system: System) -> None:
     first = y.shape[0] - 1 - system.states.shape[0]
     for c in range(s.state.shape[0]):
         k = first + s.state[c]
-        y[k + MODE] = s.mode[c]
+        y[k] = s.mode[c]
         for i in range(3):
             y[k + WAY + i], y[k + NEAR + i] = s.way[c, i], s.near[c, i]
         work += s.work[c]

@@ -3,6 +3,7 @@
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
+from dap3d_core.assembly.evaluate import zero
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.contacts.forces import (
     ZERO,
@@ -270,8 +271,7 @@ def let_leave(s: ContactArrays, count: int) -> None:
                 s.closed[s.closed_count] = c
                 s.closed_count += 1
         without = s.closed_count
-        for k in range(3 * without):
-            s.cone.x[k] = 0.0
+        zero(s.cone.x[: 3 * without])
         holds = put_matrix(s, True) and solve_forces(s, 1.0, False)
         if not holds or put_returning(s, -ZERO * big) > 0:
             if not holds or without > 0:

@@ -17,6 +17,7 @@ import math
 
 import numpy as np
 
+from dap3d_core.assembly.evaluate import copy, zero
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.contacts.forces import (
     BOUNDLESS,
@@ -113,8 +114,7 @@ def are_held_inside(s: ContactArrays, resisting: bool) -> bool:
             return False
     if not is_left_to_rows(s):
         return False
-    for k in range(3 * s.closed_count):
-        s.inner[k] = s.cone.x[k]
+    copy(s.inner[: 3 * s.closed_count], s.cone.x)
     return True
 
 
@@ -125,8 +125,7 @@ def put_least(s: ContactArrays, resisting: bool) -> int:
     Returns how many of these there are; -1 where nothing holds.
     """
     n, A, x, K, count = put_own_rows(s), s.cone.A, s.cone.x, s.cone.K, 0
-    for k in range(3 * s.closed_count):
-        x[k] = 0.0
+    zero(x[: 3 * s.closed_count])
     for q in range(n):
         s.right[q] = -s.cone.b[s.rows[q]]
         for i in range(n if carries(s, s.rows[q], resisting) else 0):
@@ -135,8 +134,7 @@ def put_least(s: ContactArrays, resisting: bool) -> int:
     least = DEPENDENT * max(largest_entry(A, 3 * s.closed_count), most_mobile(s))
     rank = factor_least(s.B, n, count, 0.0, least, s.w, s.order)
     for k in range(3 * s.closed_count):
-        for i in range(count - rank + 1):
-            K[k, i] = 0.0
+        zero(K[k][: count - rank + 1])
     solve_least(s.B, n, count, rank, s.w, s.order, s.right, s.x)
     for i in range(-1, count - rank):
         if i >= 0:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from dap3d_core.assembly.evaluate import zero
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -124,8 +125,7 @@ def least_solution(m: int, A: Floats, b: Floats, acts: Integers, x: Floats, spac
         for k in range(m):
             S[i, k] = 0.5 * (A[i, k] + A[k, i]) if (acts[i] != 0) & (acts[k] != 0) else 0.0
     diagonalise(m, S, V)
-    for k in range(m):
-        x[k] = 0.0
+    zero(x[:m])
     for q in range(m):
         if S[q, q] > FREEDOM:
             part = 0.0

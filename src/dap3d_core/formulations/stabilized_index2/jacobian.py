@@ -173,8 +173,7 @@ def call_element(t: float, e: int, q: int, system: System, loops: Any, tangent: 
     i0, p0 = system.groups[g, 0] + q * row[STRIDE], system.groups[g, 1] + q * row[PAR_WIDTH]
     place, force, D, x = (i0, p0, 1), tangent.force, tangent.D, tangent.minus_lambda
     for n in range(slots):
-        for c in range(6 * WIDTH * idx[i0 + n], 6 * WIDTH * (idx[i0 + n] + 1)):
-            force[c] = 0.0
+        zero(force[6 * WIDTH * idx[i0 + n] : 6 * WIDTH * (idx[i0 + n] + 1)])
     if kind == POSITION_ELEMENT:
         call_loop(loops, row[DERIVATIVE], t, wide, place, tangent.gamma, x, x)
         first = WIDTH * idx[i0 + row[ROW_AT]]

@@ -16,6 +16,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from dap3d_core.assembly.evaluate import zero
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.event_location import (
     end_is_across,
@@ -231,8 +232,7 @@ def interpolate(work: AdamsState, back: float, out: Floats) -> None:
         for q in range(last - j):
             line[q] = gamma * line[q] - eta * line[q + 1]
         g[j], before = line[0], psi[j]
-    for i in range(out.size):
-        out[i] = 0.0
+    zero(out)
     for j in range(last - 1, -1, -1):
         for i in range(out.size):
             out[i] += g[j] * differences[j, i]
@@ -277,8 +277,7 @@ def begin(work: AdamsState, rhs: Function, system: Any, loops: Any) -> None:
     if work.h == 0.0:
         longest = FIRST_PART * (work.times[-1] - work.times[0])
         work.h = with_slopes(min(first_step(work, f, rhs, system, loops), longest), 0.0)
-    for i in range(y.size):
-        f[1, i] = 0.0
+    zero(f[1])
     for j in range(ROWS):
         work.table[PSI, j] = j * work.h
     work.next_order, work.is_starting, work.equal_steps = 1, 1, 0

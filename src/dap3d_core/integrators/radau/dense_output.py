@@ -13,7 +13,7 @@ held to (integration.py).
 """
 
 from dap3d_core.assembly.arrays import VALUE, Floats, states_offset, velocity_offset
-from dap3d_core.assembly.evaluate import call_kinds, place_state, rates, zero
+from dap3d_core.assembly.evaluate import call_kinds, copy, place_state, rates, zero
 from dap3d_core.formulations.common.constraints import (
     PART,
     acceleration_residual,
@@ -57,8 +57,7 @@ def find_slope(t: float, h: float, work: RadauState, given: Given) -> float:
         zero(system.change)
     rates(y, metric, system.change, out)
     last = y.shape[0] - 1
-    for k in range(states_offset(n), last):
-        out[k] = 0.0
+    zero(out[states_offset(n) : last])
     for k in range(velocity_offset(1, n), last):
         out[k] += end_rate(inverse, h, work, k)
     out[last] = work.F[work.stages - 1, last]
@@ -170,8 +169,7 @@ def of_three_ends(h: float, work: RadauState) -> None:
 def dense_state(work: RadauState, t: float, y: Floats) -> None:
     """The state at an instant of the last step, by Newton's form of its dense output."""
     terms, nodes, theta = work.terms, work.nodes, (t - work.t_dense) / work.h_dense
-    for i in range(y.shape[0]):
-        y[i] = terms[work.dense_degree, i]
+    copy(y, terms[work.dense_degree])
     for row in range(work.dense_degree - 1, -1, -1):
         factor = theta - nodes[row]
         for i in range(y.shape[0]):

@@ -15,7 +15,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.assembly.arrays import LENGTH, STEP, Floats, System
-from dap3d_core.assembly.evaluate import zero
+from dap3d_core.assembly.evaluate import copy, zero
 from dap3d_core.formulations.stabilized_index2.jacobian import BENT, MAY_BEND
 from dap3d_core.integrators.radau.convergence import size_of_change
 from dap3d_core.integrators.radau.error import filter_error, sum_work
@@ -230,11 +230,9 @@ def solve_rate(h: float, work: RadauState, given: Given) -> None:
     """R[0] from a residual to the change, with the real matrix."""
     tangent = given[2]
     x, residual = work.xr, work.R[0]
-    for k in range(x.shape[0]):
-        x[k] = residual[k]
+    copy(x, residual)
     solve_lu(tangent.nodes, tangent.columns, work.K, work.pivots, x)
-    for k in range(x.shape[0]):
-        residual[k] = x[k]
+    copy(residual[: x.size], x)
     residual[residual.shape[0] - 1] = 0.0
 
 
@@ -320,8 +318,7 @@ class JointRadauIntegration(RadauIntegration):
         contacts = self.evaluator.system.contacts
         if not len(contacts):
             return count
-        from dap3d_core.formulations.contacts.equations import STATE
-        from dap3d_core.formulations.contacts.rows import OF_CONTACT
+        from dap3d_core.formulations.contacts.equations import OF_CONTACT, STATE
 
         of_contacts = np.add.outer(contacts[:, STATE], np.arange(OF_CONTACT))
         return int(np.max(np.setdiff1d(np.arange(count), of_contacts), initial=-1)) + 1

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, System, velocity_offset
-from dap3d_core.assembly.evaluate import largest, place, zero
+from dap3d_core.assembly.evaluate import copy, largest, place, zero
 from dap3d_core.assembly.state_update import add_displacement, add_velocity
 from dap3d_core.formulations.common.constraints import linearise
 from dap3d_core.formulations.stabilized_index2.jacobian import BENT, differentiate
@@ -162,8 +162,7 @@ def predict(h: float, work: RadauState, prolong: bool, system: System) -> None:
         for r in range(2):
             zero(now[i, r])
         if work.has_last_step == 0 or not prolong or keeps:
-            for k in range(now.shape[2]):
-                now[i, 1, k] = last[before - 1, 1, k]
+            copy(now[i, 1], last[before - 1, 1])
         if work.has_last_step == 0 and prolong and keeps:
             for k in range(stages.shape[1]):
                 stages[i, k] = c[i] * h * work.state[SLOPE, k]

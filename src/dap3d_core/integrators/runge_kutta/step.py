@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 
+from dap3d_core.assembly.evaluate import copy
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.runge_kutta.stiffness import detect_stiffness
 from dap3d_core.integrators.runge_kutta.sums import (
@@ -71,7 +72,7 @@ from dap3d_core.integrators.stepping.step_control import (
     step_reduction,
 )
 from dap3d_core.integrators.stepping.switch_values import evaluate
-from dap3d_core.integrators.stepping.vector_ops import all_finite, copy, scaled_largest
+from dap3d_core.integrators.stepping.vector_ops import all_finite, scaled_largest
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.kernels.scalar_math import where, with_slopes
@@ -251,9 +252,7 @@ def take_stages(
 
     False where one of them lies beyond a switch, or at a singular state: then the step is cut.
     """
-    k, table = work.k, work.table
-    rhs, project, _, watch = functions
-    stages, watched = work.stage_count, work.switch_count != 0
+    stages, table, k = work.stage_count, work.table, work.k
     last = stages if work.error_uses_last_stage != 0 else stages - 1
     for i in range(1, stages + 1):
         x = work.state[at.TRIAL] if i == stages else work.state[at.SCRATCH]
@@ -261,15 +260,27 @@ def take_stages(
         if i <= last:
             c = table[i, ABSCISSA]
             t = t1 if c == 1.0 else work.t + c * h
-            if near:
-                project_stage(work, t, x, project, system, loops)
-                x = work.state[at.SCRATCH]
-                if cut_at_stage(work, t, t1):
-                    return False
-            if watched and is_sample_across(work, t, x, watch, system, loops):
+            if not evaluate_stage(work, i, t, x, t1, near, functions, system, loops):
                 return False
             work.rhs_count += 1
-            rhs(t, x, k[i], system, loops)
+    return True
+
+
+@compiled
+def evaluate_stage(
+    work: RungeKuttaState, i: int, t: float, x: Floats, t1: float, near: bool, functions: Any,
+    system: Any, loops: Any,
+) -> bool:  # fmt: skip
+    """Rates of stage i, at t and the state x, of a step to t1; False as for ``take_stages``."""
+    rhs, project, _, watch = functions
+    if near:
+        project_stage(work, t, x, project, system, loops)
+        x = work.state[at.SCRATCH]
+        if cut_at_stage(work, t, t1):
+            return False
+    if work.switch_count != 0 and is_sample_across(work, t, x, watch, system, loops):
+        return False
+    rhs(t, x, work.k[i], system, loops)
     return True
 
 
@@ -429,18 +440,11 @@ def take_dense_stages(
 ) -> bool:
     """The further stages that dense output needs; False as for ``take_stages``."""
     t, argument, table, k = work.t, work.state[at.SCRATCH], work.table, work.k
-    rhs, project, _, watch = functions
-    watched = work.switch_count != 0
     for i in range(work.stage_count + 1, k.shape[0]):
         instant = t + table[i, ABSCISSA] * (t1 - t)
         combine(argument, 1.0, work.state[at.Y], t1 - t, table, i, k)
-        if near:
-            project_stage(work, instant, argument, project, system, loops)
-            if cut_at_stage(work, instant, t1):
-                return False
-        if watched and is_sample_across(work, instant, argument, watch, system, loops):
+        if not evaluate_stage(work, i, instant, argument, t1, near, functions, system, loops):
             return False
-        rhs(instant, argument, k[i], system, loops)
     return True
 
 

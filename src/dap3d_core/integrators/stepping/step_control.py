@@ -7,10 +7,11 @@ their codes DOPRI5 and DOP853.
 import math
 from typing import Any
 
+from dap3d_core.assembly.evaluate import copy
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration_state import Function
 from dap3d_core.integrators.stepping.output import NEAR_SINGULAR
-from dap3d_core.integrators.stepping.vector_ops import copy, scaled_largest
+from dap3d_core.integrators.stepping.vector_ops import scaled_largest
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.kernels.scalar_math import with_slopes
