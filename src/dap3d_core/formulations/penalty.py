@@ -24,6 +24,7 @@ from dap3d_core.assembly.evaluate import (
 from dap3d_core.formulations.common import constraints
 from dap3d_core.formulations.common.constraints import (
     PART,
+    factorise_regularised,
     linearise,
     power_of_drivers,
     report_levels,
@@ -35,7 +36,6 @@ from dap3d_core.formulations.common.constraints import (
 from dap3d_core.formulations.common.friction import solve_with_friction
 from dap3d_core.formulations.common.projection import project_onto
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.linear.ldlt.factor import assemble, factor, regularise
 
 
 @compiled
@@ -63,9 +63,7 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     zero(force)
     call_kinds(WRENCH, WRENCH, t, system, loops, force, force, force)
     power = scale_forces(system.body, system.metric, force, system.acceleration)
-    assemble(system.targets, system.contributions, system.D, system.K)
-    regularise(system.nodes, system.compliance, system.K)
-    factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
+    factorise_regularised(system)
     power += solve_with_friction(t, system, loops, solve)
     return power + power_of_drivers(system)
 

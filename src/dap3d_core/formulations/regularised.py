@@ -9,12 +9,13 @@ from dap3d_core.assembly.evaluate import copy, largest, zero
 from dap3d_core.formulations.common.constraints import (
     PART,
     acceleration_residual,
+    factorise_regularised,
     solve_equations,
     solve_rows,
 )
 from dap3d_core.formulations.common.friction import has_friction
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.linear.ldlt.factor import assemble, factor, regularise, weigh_rows
+from dap3d_core.linear.ldlt.factor import weigh_rows
 
 #: How often the rows are solved.
 SOLVES = 3
@@ -87,9 +88,7 @@ def take_seen(system: System, n: Floats, w: Floats, e: float) -> float:
     nothing = NOTHING * largest(system.total)
     for k in range(n.shape[0]):
         system.compliance[k] = e * w[k]
-    assemble(system.targets, system.contributions, system.D, system.K)
-    regularise(system.nodes, system.compliance, system.K)
-    factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
+    factorise_regularised(system)
     for _ in range(LEAST_SOLVES):
         for k in range(n.shape[0]):
             x[k] = e * w[k] * n[k]

@@ -85,10 +85,18 @@ def factorise(system: System, part: float | None) -> int:
     Returns the number of pivots that have become small (``system.smallest``): the pose is near a
     singular one.
     """
-    assemble(system.targets, system.contributions, system.D, system.K)
     if part is not None:
         weigh_rows(system.blocks, system.D, part, system.compliance)
-        regularise(system.nodes, system.compliance, system.K)
+        return factorise_regularised(system)
+    assemble(system.targets, system.contributions, system.D, system.K)
+    return factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
+
+
+@compiled_into
+def factorise_regularised(system: System) -> int:
+    """As ``factorise``, with the ``compliance`` of the rows."""
+    assemble(system.targets, system.contributions, system.D, system.K)
+    regularise(system.nodes, system.compliance, system.K)
     return factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
 
 
@@ -147,21 +155,23 @@ def residuals(t: float, system: System, loops: Any) -> float:
 @compiled
 def velocity_residuals(system: System) -> float:
     """D v - nu into ``residual``, with the current D^; returns the largest, m/s."""
-    residual = system.residual
     scale_velocities(system.body, system.metric, system.velocity)
-    for k in range(residual.shape[0]):
-        residual[k] = -system.nu[k]
-    add_product(system.blocks, system.D, system.velocity, residual)
-    return largest_weighted(residual, system.weight)
+    return residual_of(system, system.velocity, system.nu)
 
 
 @compiled
 def acceleration_residual(system: System) -> float:
     """D a - gamma into ``residual``; returns the largest, m/s^2."""
+    return residual_of(system, system.acceleration, system.gamma)
+
+
+@compiled_into
+def residual_of(system: System, x: Floats, right: Floats) -> float:
+    """D x less its right-hand side into ``residual``; returns the largest."""
     residual = system.residual
     for k in range(residual.shape[0]):
-        residual[k] = -system.gamma[k]
-    add_product(system.blocks, system.D, system.acceleration, residual)
+        residual[k] = -right[k]
+    add_product(system.blocks, system.D, x, residual)
     return largest_weighted(residual, system.weight)
 
 

@@ -36,10 +36,10 @@ from dap3d_core.formulations.contacts.rows import (
     add_scaled,
     change,
     lift,
-    move_on,
     put_feels,
     put_free,
     put_rows,
+    put_velocities,
     put_velocity,
     unscale,
 )
@@ -99,8 +99,7 @@ def decide(
         return WEDGED
     if s.round_count > 0:
         stop_what_rests(s, system)
-    move_on(t, s, system, loops)
-    find_grips(t, s, system, tensions)
+    move_on(t, s, system, loops, tensions)
     if s.jammed >= 0:
         for c in range(s.jams.shape[0]):
             s.jams[c] = c == s.jammed
@@ -108,8 +107,7 @@ def decide(
         if not unjam(s, system):
             return blame(s)
         s.freed += 1
-        move_on(t, s, system, loops)
-        find_grips(t, s, system, tensions)
+        move_on(t, s, system, loops, tensions)
         for c in range(s.begins.shape[0]):
             s.begins[c] = s.leaves[c] = 0
         if not find_lasting(t, s, system, loops, functions, tensions):
@@ -117,6 +115,14 @@ def decide(
     settle(s, system)
     put_state(s, system)
     return DECIDED
+
+
+@compiled
+def move_on(t: float, s: ContactArrays, system: System, loops: Any, tensions: Any) -> None:
+    """Place the bodies with the present velocities, and find coefficients of friction there."""
+    put_velocities(s, system)
+    place(t, s.placed, system, loops)
+    find_grips(t, s, system, tensions)
 
 
 @compiled
@@ -189,8 +195,7 @@ def share_anew(
         if s.mode[c] > 0.5:
             s.in_touch[s.in_touch_count] = c
             s.in_touch_count += 1
-    move_on(t, s, system, loops)
-    find_grips(t, s, system, tensions)
+    move_on(t, s, system, loops, tensions)
     are_same = find_modes_now(t, s, system, loops, functions)
     for c in range(s.mode.shape[0]):
         are_same &= s.mode[c] == s.was[c]
@@ -369,8 +374,7 @@ def find_lasting(
         if not find_low(s):
             return True
         hold_low(s, system)
-        move_on(t, s, system, loops)
-        find_grips(t, s, system, tensions)
+        move_on(t, s, system, loops, tensions)
     return False
 
 

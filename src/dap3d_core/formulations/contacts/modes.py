@@ -102,21 +102,13 @@ def sort(numbers: Integers, count: int) -> None:
 
 
 @compiled
-def close_group(s: ContactArrays) -> None:
-    """Let the set that is worked on be the group."""
-    for k in range(s.group_count):
-        s.closed[k] = s.group[k]
-    s.closed_count = s.group_count
-
-
-@compiled
 def put_modes(s: ContactArrays) -> bool:
     """Find the modes of the group; False if it jams."""
-    close_group(s)
-    leaves = begins = 0
-    for k in range(s.closed_count):
-        leaves += s.leaves[s.closed[k]]
-        begins += s.begins[s.closed[k]]
+    leaves, begins, s.closed_count = 0, 0, s.group_count
+    for k in range(s.group_count):
+        c = s.closed[k] = s.group[k]
+        leaves += s.leaves[c]
+        begins += s.begins[c]
     if leaves + begins > 0:
         # of contacts that share, one at the end of its cone may only have to carry less
         if not put_matrix(s, False):

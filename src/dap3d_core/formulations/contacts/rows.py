@@ -203,13 +203,6 @@ def put_velocities(s: ContactArrays, system: System) -> None:
 
 
 @compiled
-def move_on(t: float, s: ContactArrays, system: System, loops: Any) -> None:
-    """Place the bodies with the present velocities."""
-    put_velocities(s, system)
-    place(t, s.placed, system, loops)
-
-
-@compiled
 def put_free(t: float, s: ContactArrays, system: System, loops: Any, functions: Any) -> None:
     """Rates of slip at the present velocities where all contacts are open, and multipliers."""
     if s.is_free != 0:

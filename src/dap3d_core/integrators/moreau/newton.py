@@ -220,9 +220,7 @@ def residual_of(s: StepArrays, v: Floats, left: float) -> float:
 @compiled
 def begin_round(s: StepArrays) -> None:
     """Take the velocities v as those that a round counts its changes from."""
-    for q in range(s.used_count):
-        for k in range(6):
-            s.delta[s.used[q], k] = 0.0
+    clear(s, s.delta)
     for q in range(s.chosen_count):
         put_speeds(s, s.chosen[q], s.v)
     for q in range(s.row_count):

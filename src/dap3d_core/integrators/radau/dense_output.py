@@ -14,6 +14,7 @@ held to (integration.py).
 
 from dap3d_core.assembly.arrays import VALUE, Floats, states_offset, velocity_offset
 from dap3d_core.assembly.evaluate import call_kinds, copy, place_state, rates, zero
+from dap3d_core.assembly.metric import scaled
 from dap3d_core.formulations.common.constraints import (
     PART,
     acceleration_residual,
@@ -84,10 +85,8 @@ def scale_slopes(inverse: Floats, h: float, work: RadauState, metric: Floats,
             force[o + c] = end_rate(inverse, h, work, f + c)
         for c in range(3):
             force[o + c] /= k[0]
-        z2 = force[o + 5] / k[6]
-        z1 = (force[o + 4] - k[5] * z2) / k[4]
-        force[o + 3] = (force[o + 3] - k[2] * z1 - k[3] * z2) / k[1]
-        force[o + 4], force[o + 5] = z1, z2
+        turn = scaled(k, force[o + 3], force[o + 4], force[o + 5])
+        force[o + 3], force[o + 4], force[o + 5] = turn
 
 
 @compiled

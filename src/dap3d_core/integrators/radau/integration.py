@@ -13,7 +13,6 @@ from dap3d_core.formulations.stabilized_index2.jacobian import BODY, FIRST_ROW, 
 from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
 from dap3d_core.formulations.stabilized_index2.state_tangent import (
     OF_LOOPS,
-    coupled_bodies,
     make_tangent,
 )
 from dap3d_core.integrators.radau import state as at
@@ -60,7 +59,9 @@ def make_matrix(evaluator: Evaluator, tangent: Any) -> tuple[StageMatrix, LuPlan
     reading = [_node_of(row[FIRST_ROW], starts, nodes) for row in readings]
     read = [(k, row[BODY]) for k, row in zip(reading, readings, strict=True) if row[BODY]]
     states = _state_nodes(model, nodes)
-    lu = make_lu_plan(n, nodes, coupled_bodies(tangent), states, read)
+    blocks = tangent.blocks.tolist()
+    coupled = [(a, b) for _, a, b in blocks if a != b]
+    lu = make_lu_plan(n, nodes, coupled, states, read)
     of_row = {}
     joints = []
     for k, node in enumerate(nodes):
@@ -74,7 +75,6 @@ def make_matrix(evaluator: Evaluator, tangent: Any) -> tuple[StageMatrix, LuPlan
     state_nodes, state_places = _state_tables(evaluator, states, lu)
     held = np.zeros(plan.row_size, dtype=np.int64)
     held[evaluator.system.row] = model.position_row
-    blocks = tangent.blocks.tolist()
     matrix = StageMatrix(
         nodes=lu.nodes,
         columns=lu.columns,

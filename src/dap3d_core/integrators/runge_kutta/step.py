@@ -41,8 +41,8 @@ from dap3d_core.integrators.stepping.event_location import (
     update_switches_after_step,
 )
 from dap3d_core.integrators.stepping.integration_state import Function
-from dap3d_core.integrators.stepping.output import dense_state, may_step, needs_dense, project_state
-from dap3d_core.integrators.stepping.rounding import record_failure, update_rounding
+from dap3d_core.integrators.stepping.output import dense_state, needs_dense, project_state
+from dap3d_core.integrators.stepping.rounding import record_failure
 from dap3d_core.integrators.stepping.singular_poses import (
     is_approaching,
     is_at_singularity,
@@ -54,6 +54,7 @@ from dap3d_core.integrators.stepping.singular_poses import (
     update_measures,
 )
 from dap3d_core.integrators.stepping.step_control import (
+    FROM_START,
     LARGEST,
     SINGULAR_END_ATTEMPTS,
     SINGULAR_END_REACH,
@@ -61,8 +62,8 @@ from dap3d_core.integrators.stepping.step_control import (
     STEP_AFTER_SINGULAR_END,
     STEP_CUT,
     accept,
+    advance_by,
     combined_error,
-    count_turns,
     end_of_step,
     first_step,
     judge_turns,
@@ -94,17 +95,7 @@ def advance(
 
     At least one step is tried in each call, whatever the budget.
     """
-    rhs, project, report = functions[0], functions[1], functions[2]
-    watch = functions[4] if work.switch_count != 0 else rhs
-    accepted = functions[3] if work.calls_accepted != 0 else rhs
-    limit = work.rhs_count + budget
-    while may_step(work, dense_state, limit, project, report, system, loops):
-        steps, rejected = work.step_count, work.rejected_count
-        h = work.h
-        step(work, (rhs, project, accepted, watch), system, loops)
-        update_rounding(work, work.k[0], h, rejected, rhs, system, loops)
-        if work.calls_accepted != 0 and work.step_count > steps:
-            count_turns(work, accepted, system, loops)
+    advance_by(step, dense_state, work, work.k[0], functions, system, loops, budget, FROM_START)
 
 
 @compiled
