@@ -8,7 +8,10 @@ end: the states of elements that have some (docs/decisions/0054), and the work d
 from typing import Any
 
 from dap3d_core.assembly.arrays import (
+    ENERGY,
     RATE,
+    SCRATCH,
+    TURNED,
     VALUE,
     WRENCH,
     Floats,
@@ -207,6 +210,18 @@ def global_accelerations(metric: Floats, acceleration: Floats, out: Floats) -> N
         for c in range(3):
             out[o - 6 + c] = k[0] * acceleration[o + c]
             out[o - 3 + c] = k[7 + 3 * c] * a0 + k[8 + 3 * c] * a1 + k[9 + 3 * c] * a2
+
+
+@compiled_into
+def report_energy(t: float, out: Floats, system: System, loops: Any) -> None:
+    """Potential energy, fourth from the end of out; angles of elements, behind the multipliers."""
+    value = system.settings[SCRATCH : SCRATCH + 1]
+    value[0] = 0.0
+    call_kinds(ENERGY, ENERGY, t, system, loops, value, value, value)
+    out[out.shape[0] - 4] = value[0]
+    value[0] = 0.0
+    angles = out[6 * (system.body.shape[0] - 1) + system.row.shape[0] :]
+    call_kinds(TURNED, TURNED, t, system, loops, angles, value, value)
 
 
 @compiled

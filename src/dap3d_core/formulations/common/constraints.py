@@ -10,12 +10,9 @@ from typing import Any
 
 from dap3d_core.assembly.arrays import (
     ACCELERATION,
-    ENERGY,
     EVEN,
     LENGTH,
     POSITION,
-    SCRATCH,
-    TURNED,
     Floats,
     System,
 )
@@ -25,6 +22,7 @@ from dap3d_core.assembly.evaluate import (  # noqa: F401  read by projection.py
     largest_weighted,
     place,
     place_bodies,
+    report_energy,
     scale_velocities,
     zero,
 )
@@ -218,17 +216,11 @@ def report_levels(t: float, y: Floats, out: Floats, system: System, loops: Any) 
     The last four are the potential energy and the largest residuals of position, velocity and
     acceleration; before them are the angles whose turns are counted, those of joints last.
     """
-    value = system.settings[SCRATCH : SCRATCH + 1]
     last = out.shape[0] - 4
     out[last + 3] = acceleration_residual(system)
     out[last + 2] = velocity_residuals(system)
     out[last + 1] = residuals(t, system, loops)
-    value[0] = 0.0
-    call_kinds(ENERGY, ENERGY, t, system, loops, value, value, value)
-    out[last] = value[0]
-    value[0] = 0.0
-    angles = out[6 * (system.body.shape[0] - 1) + system.row.shape[0] :]
-    call_kinds(TURNED, TURNED, t, system, loops, angles, value, value)
+    report_energy(t, out, system, loops)
     report_turns(t, y, out[last - system.turns.shape[0] :], system)
 
 
