@@ -30,7 +30,6 @@ from dap3d_core.integrators.moreau.reduced import (
     LEAST,
     LESS,
     factor_joints,
-    is_small,
     meet_joints,
     put_felt,
     reduced_round,
@@ -180,7 +179,7 @@ def solve_group(s: StepArrays, tolerance: float) -> bool:
     if few or joined:
         aim = RESIDUAL_ROUNDING if few and tolerance < NEAR else tolerance
         s.residual = 1e300
-        if is_small(s):
+        if joined and 3 * s.chosen_count <= s.small_step.size:  # few beside joints: alone
             if not factor_joints(s):
                 return False
             s.residual = newton(s, aim, True)

@@ -47,12 +47,6 @@ LESS, LEAST = 1e-2, 1.0
 
 
 @compiled
-def is_small(s: StepArrays) -> bool:
-    """True of so few contacts beside joints that their problem is solved alone."""
-    return s.row_count > 0 and 3 * s.chosen_count <= s.small_step.size
-
-
-@compiled
 def factor_joints(s: StepArrays) -> bool:
     """Put the factors of the bodies' masses with stiff joints; False without room."""
     m = s.chosen_count
