@@ -3,7 +3,7 @@
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
-from dap3d_core.assembly.evaluate import zero
+from dap3d_core.assembly.evaluate import largest, zero
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.contacts.forces import (
     ZERO,
@@ -326,14 +326,12 @@ def put_found(s: ContactArrays, begins: bool, inner: bool, loose: bool) -> bool:
     if holds:
         for k in range(3 * s.closed_count):
             s.cone.x[k], s.rates[k] = s.inner[k], 0.0
-    largest, count = 0.0, 0
-    for k in range(3 * s.closed_count):
-        largest = max(largest, abs(s.cone.x[k]))
+    size, count = largest(s.cone.x[: 3 * s.closed_count]), 0
     for k in range(s.closed_count):
         count += s.cone.under[k] == k
     for k in range(s.closed_count):
         if s.under[s.closed[k]] < 0 or s.mode[s.under[s.closed[k]]] > 0.0:
-            put_one(s, k, shares, count == 1, ZERO * largest)
+            put_one(s, k, shares, count == 1, ZERO * size)
     if shares:
         leave_to_others(s)
     return True

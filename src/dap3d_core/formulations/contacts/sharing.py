@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from dap3d_core.assembly.evaluate import copy, zero
+from dap3d_core.assembly.evaluate import copy, largest, zero
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.contacts.forces import (
     BOUNDLESS,
@@ -164,15 +164,14 @@ def is_left_to_rows(s: ContactArrays) -> bool:
 
     Of weak rows that is more force than their own mobility tells.
     """
-    n, A, big = put_own_rows(s), s.cone.A, 0.0
+    n, A = put_own_rows(s), s.cone.A
     for i in range(n):
         s.x[i] = s.rates[s.rows[i]]
         for k in range(n):
             s.B[i, k] = A[s.rows[i], s.rows[k]]
     rank = factor_least(s.B, n, n, DEPENDENT, 0.0, s.w, s.order)
     solve_least(s.B, n, n, rank, s.w, s.order, s.x, s.right)
-    for k in range(3 * s.closed_count):
-        big = max(big, abs(s.cone.x[k]))
+    big = largest(s.cone.x[: 3 * s.closed_count])
     for q in range(n):
         if not abs(s.right[q]) <= OF_REST * rim_of(s, s.rows[q] // 3) + FORCE_ROUNDING * big:
             return False
@@ -187,9 +186,8 @@ def come_inside(s: ContactArrays, free: int) -> bool:
         s: with the least forces that hold, and vectors ``cone.K`` that may be added.
         free: how many of these there are.
     """
-    size, terms = 0.0, 5.0 * s.closed_count  # twice as many logarithms as cones, and forces
-    for k in range(3 * s.closed_count):
-        size = max(size, abs(s.cone.x[k]))
+    size = largest(s.cone.x[: 3 * s.closed_count])
+    terms = 5.0 * s.closed_count  # twice as many logarithms as cones, and forces
     t = farthest_outside(s)
     if not size > 0.0 or not t < np.inf:
         return False
