@@ -102,13 +102,6 @@ def square_of(e: Any) -> float:
 @compiled_into
 def put_rotation(b: Floats, k: int, e: Any, h: float) -> None:
     """Store the rotation matrix of Euler parameters at k; h: 2/(e . e)."""
-    e0, e1, e2, e3 = e
-    b[k] = 1.0 - h * (e2 * e2 + e3 * e3)
-    b[k + 1] = h * (e1 * e2 - e0 * e3)
-    b[k + 2] = h * (e1 * e3 + e0 * e2)
-    b[k + 3] = h * (e1 * e2 + e0 * e3)
-    b[k + 4] = 1.0 - h * (e1 * e1 + e3 * e3)
-    b[k + 5] = h * (e2 * e3 - e0 * e1)
-    b[k + 6] = h * (e1 * e3 - e0 * e2)
-    b[k + 7] = h * (e2 * e3 + e0 * e1)
-    b[k + 8] = 1.0 - h * (e1 * e1 + e2 * e2)
+    b[k], b[k + 1], b[k + 2] = rotation_row(e, h, 0)
+    b[k + 3], b[k + 4], b[k + 5] = rotation_row(e, h, 1)
+    b[k + 6], b[k + 7], b[k + 8] = rotation_row(e, h, 2)

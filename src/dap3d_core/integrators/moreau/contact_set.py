@@ -10,7 +10,7 @@ from dap3d_core.assembly.arrays import ACCELERATION, POSITION, System
 from dap3d_core.assembly.collisions.find import find_touches, touch
 from dap3d_core.assembly.collisions.placed_shapes import place_shapes
 from dap3d_core.assembly.evaluate import call_kinds, copy, place, zero
-from dap3d_core.assembly.metric import rotation_row, square_of
+from dap3d_core.assembly.metric import put_rotation, rotation_row, square_of
 from dap3d_core.formulations.contacts.equations import (
     BODY_I,
     INTEGERS,
@@ -173,8 +173,8 @@ def put_inertia(s: StepArrays) -> None:
     """Put moments of inertia of the bodies as placed, in global axes."""
     A = s.turned
     for b in range(1, s.poses.shape[0]):
-        for k in range(3):
-            A[3 * k], A[3 * k + 1], A[3 * k + 2] = axes_of(s.poses[b], k)
+        e = s.poses[b, 3], s.poses[b, 4], s.poses[b, 5], s.poses[b, 6]
+        put_rotation(A, 0, e, 2.0 / square_of(e))
         turn_tensor(A, s.Jp[b], s.spin[b])
         turn_tensor(A, s.Jp_inverse[b], s.spin_inverse[b])
 
