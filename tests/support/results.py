@@ -12,8 +12,8 @@ from support.internals import COLUMNS, Evaluator, join, y_from_u
 CONTROLLED = dict(rtol=1e-8, atol=1e-10, step=None, project=True, correct=True, conservative=True)
 
 
-def model_of(scene):
-    return build_model(check(scene, dap.load_registry()))
+def model_of(scene, registry=None):
+    return build_model(check(scene, registry or dap.load_registry()))
 
 
 def about_z(angle):

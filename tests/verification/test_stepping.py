@@ -377,8 +377,7 @@ def test_small_problems_have_the_results_of_sparse_matrices(monkeypatch):
     """Dense arrays take the place of sparse ones up to a size, to rounding of the solves."""
     given = {"t_end": 0.4, "dt": 0.1, "contact_step": 4e-3}
     dense = dap.simulate(ball(0.2, mu=0.3), **given)
-    for module in ("newton", "problem"):
-        monkeypatch.setattr(f"dap3d_core.integrators.moreau.{module}.SMALL", 0)
+    monkeypatch.setattr("dap3d_core.integrators.moreau.arrays.DENSE_SIZE", 0)
     assert dap.simulate(ball(0.2, mu=0.3), **given).u == pytest.approx(dense.u, abs=1e-11)
 
 

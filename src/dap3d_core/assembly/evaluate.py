@@ -8,7 +8,10 @@ end: the states of elements that have some (docs/decisions/0054), and the work d
 from typing import Any
 
 from dap3d_core.assembly.arrays import (
+    ENERGY,
     RATE,
+    SCRATCH,
+    TURNED,
     VALUE,
     WRENCH,
     Floats,
@@ -23,6 +26,7 @@ from dap3d_core.assembly.metric import (
     scaled_moment,
     unscaled,
 )
+from dap3d_core.kernels.array_types import SeparateFloats
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.scalar_math import where
@@ -121,6 +125,13 @@ def zero(values: Floats) -> None:
 
 
 @compiled
+def copy(out: SeparateFloats, x: Floats) -> None:
+    """``out = x``, as long as out is."""
+    for i in range(out.size):
+        out[i] = x[i]
+
+
+@compiled
 def scale_forces(body: Floats, metric: Floats, force: Floats, out: Floats) -> float:
     """Scaled right-hand side of the bodies into out, from forces; returns the power of these.
 
@@ -139,6 +150,19 @@ def scale_forces(body: Floats, metric: Floats, force: Floats, out: Floats) -> fl
         out[o + 3] = k[7] * n0 + k[10] * n1 + k[13] * n2 - g0
         out[o + 4] = k[8] * n0 + k[11] * n1 + k[14] * n2 - g1
         out[o + 5] = k[9] * n0 + k[12] * n1 + k[15] * n2 - g2
+    return power
+
+
+@compiled_into
+def add_force(b: int, force: Floats, out: Floats, system: System, power: float) -> float:
+    """Add the force on body b, and its moment, to scaled forces ``out``; the power with theirs."""
+    s, k, o = system.body[b], system.metric[b], 6 * b
+    n0, n1, n2 = force[o + 3], force[o + 4], force[o + 5]
+    for c in range(6):
+        power += force[o + c] * s[12 + c]
+    for c in range(3):
+        out[o + c] += k[0] * force[o + c]
+        out[o + 3 + c] += k[7 + c] * n0 + k[10 + c] * n1 + k[13 + c] * n2
     return power
 
 
@@ -169,6 +193,14 @@ def rates(y: Floats, metric: Floats, acceleration: Floats, out: Floats) -> None:
         out[f + 3], out[f + 4], out[f + 5] = a0, a1, a2
 
 
+@compiled_into
+def put_rates(t: float, y: Floats, power: float, out: Floats, system: System, loops: Any) -> None:
+    """dy/dt from ``acceleration`` and ``multipliers``; the power is the rate of the work."""
+    rates(y, system.metric, system.acceleration, out)
+    state_rates(t, out, system, loops)
+    out[out.shape[0] - 1] = power
+
+
 @compiled
 def global_accelerations(metric: Floats, acceleration: Floats, out: Floats) -> None:
     """v_dot (6 n: r_ddot, omega_dot, global) from the scaled accelerations: omega_dot = B a."""
@@ -178,6 +210,18 @@ def global_accelerations(metric: Floats, acceleration: Floats, out: Floats) -> N
         for c in range(3):
             out[o - 6 + c] = k[0] * acceleration[o + c]
             out[o - 3 + c] = k[7 + 3 * c] * a0 + k[8 + 3 * c] * a1 + k[9 + 3 * c] * a2
+
+
+@compiled_into
+def report_energy(t: float, out: Floats, system: System, loops: Any) -> None:
+    """Potential energy, fourth from the end of out; angles of elements, behind the multipliers."""
+    value = system.settings[SCRATCH : SCRATCH + 1]
+    value[0] = 0.0
+    call_kinds(ENERGY, ENERGY, t, system, loops, value, value, value)
+    out[out.shape[0] - 4] = value[0]
+    value[0] = 0.0
+    angles = out[6 * (system.body.shape[0] - 1) + system.row.shape[0] :]
+    call_kinds(TURNED, TURNED, t, system, loops, angles, value, value)
 
 
 @compiled

@@ -62,6 +62,29 @@ def scaled_moment(k: Floats, x: float, y: float, z: float) -> tuple[float, float
 
 
 @compiled_into
+def put_scaled(k: Floats, x: Floats, o: int, out: Floats) -> None:
+    """Put six numbers at o, a force and moment or a row along global axes, in scaled coordinates.
+
+    (f, n) becomes (f / sqrt(m), B^T n).
+    """
+    for c in range(3):
+        out[o + c] = k[0] * x[o + c]
+        turning = x[o + 3] * k[7 + c] + x[o + 4] * k[10 + c] + x[o + 5] * k[13 + c]
+        out[o + 3 + c] = turning
+
+
+@compiled_into
+def rotation_row(e: Any, h: float, k: int) -> tuple[float, float, float]:
+    """Row k of the rotation matrix of Euler parameters of any length; h: 2/(e . e)."""
+    a, x, y, z = e
+    if k == 0:
+        return 1.0 - h * (y * y + z * z), h * (x * y - z * a), h * (x * z + y * a)
+    if k == 1:
+        return h * (x * y + z * a), 1.0 - h * (x * x + z * z), h * (y * z - x * a)
+    return h * (x * z - y * a), h * (y * z + x * a), 1.0 - h * (x * x + y * y)
+
+
+@compiled_into
 def orient_by_state(b: Floats, o: int, e: Any) -> None:
     """The same of the state, of any length; A waits for no square root."""
     square = square_of(e)
@@ -79,13 +102,6 @@ def square_of(e: Any) -> float:
 @compiled_into
 def put_rotation(b: Floats, k: int, e: Any, h: float) -> None:
     """Store the rotation matrix of Euler parameters at k; h: 2/(e . e)."""
-    e0, e1, e2, e3 = e
-    b[k] = 1.0 - h * (e2 * e2 + e3 * e3)
-    b[k + 1] = h * (e1 * e2 - e0 * e3)
-    b[k + 2] = h * (e1 * e3 + e0 * e2)
-    b[k + 3] = h * (e1 * e2 + e0 * e3)
-    b[k + 4] = 1.0 - h * (e1 * e1 + e3 * e3)
-    b[k + 5] = h * (e2 * e3 - e0 * e1)
-    b[k + 6] = h * (e1 * e3 - e0 * e2)
-    b[k + 7] = h * (e2 * e3 + e0 * e1)
-    b[k + 8] = 1.0 - h * (e1 * e1 + e2 * e2)
+    b[k], b[k + 1], b[k + 2] = rotation_row(e, h, 0)
+    b[k + 3], b[k + 4], b[k + 5] = rotation_row(e, h, 1)
+    b[k + 6], b[k + 7], b[k + 8] = rotation_row(e, h, 2)

@@ -54,7 +54,10 @@ def build_loops(
     for kind in KINDS:
         if kind not in kinds:
             continue
-        for group in _groups_for(model, kind):
+        groups = (*model.functions, *model.forces, *model.joints)
+        if kind == "friction":
+            groups = (*model.friction, *model.forces, *model.contacts)
+        for group in groups:
             if kind == "rate" and computes_rate(group.type_info):
                 continue
             loop = compiled_loop(group.type_info, kind, announce)
@@ -62,12 +65,6 @@ def build_loops(
                 loops.append(loop)
                 what.append((kind, group))
     return loop_list(loops), what
-
-
-def _groups_for(model: Model, kind: str) -> tuple[Group, ...]:
-    if kind == "friction":
-        return (*model.friction, *model.forces, *model.contacts)
-    return (*model.functions, *model.forces, *model.joints)
 
 
 def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> System:

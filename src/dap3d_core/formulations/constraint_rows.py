@@ -79,15 +79,9 @@ def scaled_rows(rows: ConstraintRows, length: float) -> tuple[ConstraintRows, Fl
 
 def jacobian_pattern(plan: Plan, row_places: Integers) -> tuple[Integers, Integers, Integers]:
     """Row, column and place in D of the Jacobian's entries; row_places: ``System.row``."""
-    blocks = plan.blocks
-    heights = blocks[:, 2]
-    count = int(heights.sum())
-    block = np.repeat(np.arange(len(blocks)), heights)
-    within = np.arange(count) - np.repeat(np.cumsum(heights) - heights, heights)
+    place, row, body = plan.entries
     model_row = np.zeros(plan.row_size, dtype=np.int64)
     model_row[row_places] = np.arange(len(row_places))
     six = np.arange(6)
-    row = np.repeat(model_row[blocks[block, 3] + within], 6)
-    column = (6 * (blocks[block, 1] - 1)[:, None] + six).ravel()
-    place = ((blocks[block, 0] + 6 * within)[:, None] + six).ravel()
-    return row, column, place
+    column = 6 * (body - 1)[:, None] + six
+    return np.repeat(model_row[row], 6), column.ravel(), (place[:, None] + six).ravel()

@@ -20,10 +20,11 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, System
-from dap3d_core.assembly.evaluate import global_accelerations, largest, rates, state_rates, zero
+from dap3d_core.assembly.evaluate import global_accelerations, largest, put_rates, zero
 from dap3d_core.formulations.common import constraints
 from dap3d_core.formulations.common.constraints import (
     PART,
+    factorise_regularised,
     report_levels,
     report_multipliers,
     solve_rows,
@@ -32,7 +33,7 @@ from dap3d_core.formulations.common.friction import has_friction
 from dap3d_core.formulations.common.projection import project_onto
 from dap3d_core.formulations.regularised import accelerate
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.linear.ldlt.factor import assemble, factor, regularise, weigh_rows
+from dap3d_core.linear.ldlt.factor import weigh_rows
 
 #: For the least multipliers: e as part of the longest row's square, and passes at most. More of
 #: them than it takes would gather rounding.
@@ -73,9 +74,7 @@ def null_space_component(system: System, n: Floats, e: float) -> float:
     x, weight, before = system.multipliers, system.weight, np.inf
     for k in range(x.shape[0]):
         system.compliance[k] = e / (weight[k] * weight[k])
-    assemble(system.targets, system.contributions, system.D, system.K)
-    regularise(system.nodes, system.compliance, system.K)
-    factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
+    factorise_regularised(system)
     for _ in range(LEAST_SOLVES):
         for k in range(x.shape[0]):
             x[k] = n[k] / (weight[k] * weight[k])
@@ -98,10 +97,7 @@ def null_space_component(system: System, n: Floats, e: float) -> float:
 @compiled
 def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """dy/dt of a state, the power of forces and drivers last."""
-    power = accelerate(t, y, system, loops)
-    rates(y, system.metric, system.acceleration, out)
-    state_rates(t, out, system, loops)
-    out[out.shape[0] - 1] = power
+    put_rates(t, y, accelerate(t, y, system, loops), out, system, loops)
 
 
 @compiled

@@ -14,16 +14,17 @@ from typing import Any
 from dap3d_core.assembly.arrays import ALPHA, MU, OMEGA, WRENCH, Floats, System
 from dap3d_core.assembly.evaluate import (
     call_kinds,
+    copy,
     global_accelerations,
     place,
-    rates,
+    put_rates,
     scale_forces,
-    state_rates,
     zero,
 )
 from dap3d_core.formulations.common import constraints
 from dap3d_core.formulations.common.constraints import (
     PART,
+    factorise_regularised,
     linearise,
     power_of_drivers,
     report_levels,
@@ -35,14 +36,12 @@ from dap3d_core.formulations.common.constraints import (
 from dap3d_core.formulations.common.friction import solve_with_friction
 from dap3d_core.formulations.common.projection import project_onto
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.linear.ldlt.factor import assemble, factor, regularise
 
 
 @compiled
 def solve(system: System) -> None:
     """``acceleration`` and ``multipliers`` from scaled forces, gamma' in ``right_side``."""
-    for k in range(system.right_side.shape[0]):
-        system.multipliers[k] = system.right_side[k]
+    copy(system.multipliers, system.right_side)
     solve_rows(system, system.acceleration)
 
 
@@ -64,9 +63,7 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     zero(force)
     call_kinds(WRENCH, WRENCH, t, system, loops, force, force, force)
     power = scale_forces(system.body, system.metric, force, system.acceleration)
-    assemble(system.targets, system.contributions, system.D, system.K)
-    regularise(system.nodes, system.compliance, system.K)
-    factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
+    factorise_regularised(system)
     power += solve_with_friction(t, system, loops, solve)
     return power + power_of_drivers(system)
 
@@ -74,10 +71,7 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
 @compiled
 def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """dy/dt of a state, the power of forces and drivers last."""
-    power = accelerate(t, y, system, loops)
-    rates(y, system.metric, system.acceleration, out)
-    state_rates(t, out, system, loops)
-    out[out.shape[0] - 1] = power
+    put_rates(t, y, accelerate(t, y, system, loops), out, system, loops)
 
 
 @compiled

@@ -55,12 +55,10 @@ def pivots(evaluator: Evaluator, t: float) -> Floats:
         linearise,
         linearise_evenly,
     )
+    from dap3d_core.linear.rank.null_space import inverse_pivots
 
-    system, plan = evaluator.system, evaluator.plan
+    system = evaluator.system
     place = linearise_evenly if system.settings[EVEN] else linearise
     place(float(t), system, evaluator.loops)
     factorise(system, PART if evaluator.formulation.accepts_redundant else None)
-    inverse = np.ones(plan.row_size)
-    for size, first, diagonal, *_ in plan.nodes[:-1]:
-        inverse[first : first + size] = system.K[diagonal : diagonal + size * size : size + 1]
-    return np.abs(1.0 / inverse[system.row])
+    return np.abs(1.0 / inverse_pivots(evaluator.plan, system.K)[system.row])

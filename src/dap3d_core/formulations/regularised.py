@@ -5,16 +5,17 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import EVEN, Floats, System
-from dap3d_core.assembly.evaluate import largest, zero
+from dap3d_core.assembly.evaluate import copy, largest, zero
 from dap3d_core.formulations.common.constraints import (
     PART,
     acceleration_residual,
+    factorise_regularised,
     solve_equations,
     solve_rows,
 )
 from dap3d_core.formulations.common.friction import has_friction
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.linear.ldlt.factor import assemble, factor, regularise, weigh_rows
+from dap3d_core.linear.ldlt.factor import weigh_rows
 
 #: How often the rows are solved.
 SOLVES = 3
@@ -51,8 +52,7 @@ def solve(system: System) -> None:
         if not left < FALLING * before:
             break
         add_pass(system)
-    for k in range(system.total.shape[0]):
-        system.multipliers[k] = system.total[k]
+    copy(system.multipliers, system.total)
     if has_friction(system):
         least_multipliers(system)
 
@@ -68,8 +68,7 @@ def least_multipliers(system: System) -> None:
     K, n, rows = system.K, system.right_side, system.total.shape[0]
     last = system.friction.shape[0] - K.shape[0]
     w, kept = system.friction[last - rows : last], system.friction[last:]
-    for k in range(K.shape[0]):
-        kept[k] = K[k]
+    copy(kept, K)
     weigh_rows(system.blocks, system.D, 1.0, system.compliance)
     e = LEAST_PART * largest(system.compliance) / largest(w)
     for k in range(rows):
@@ -77,8 +76,7 @@ def least_multipliers(system: System) -> None:
     limit, smallest = SEEN * largest(system.total), SMALLEST * e
     while take_seen(system, n, w, e) > limit and e > smallest:
         e *= SMALLER
-    for k in range(K.shape[0]):
-        K[k] = kept[k]
+    copy(K, kept)
     for k in range(rows):
         system.multipliers[k] = system.total[k] - n[k]
 
@@ -90,9 +88,7 @@ def take_seen(system: System, n: Floats, w: Floats, e: float) -> float:
     nothing = NOTHING * largest(system.total)
     for k in range(n.shape[0]):
         system.compliance[k] = e * w[k]
-    assemble(system.targets, system.contributions, system.D, system.K)
-    regularise(system.nodes, system.compliance, system.K)
-    factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
+    factorise_regularised(system)
     for _ in range(LEAST_SOLVES):
         for k in range(n.shape[0]):
             x[k] = e * w[k] * n[k]
@@ -113,8 +109,7 @@ def take_seen(system: System, n: Floats, w: Floats, e: float) -> float:
 def add_pass(system: System) -> None:
     """Solve for what the accelerations leave of the rows; ``total`` takes the change of -lambda."""
     multipliers, total = system.multipliers, system.total
-    for k in range(total.shape[0]):
-        multipliers[k] = system.gamma[k]
+    copy(multipliers, system.gamma)
     solve_rows(system, system.acceleration)
     for k in range(total.shape[0]):
         total[k] += multipliers[k]

@@ -11,7 +11,7 @@ solved by the block LDL^T of linear/ldlt/factor.py. Needs independent rows.
 from typing import Any
 
 from dap3d_core.assembly.arrays import EVEN, LENGTH, SINGULAR, Floats, System
-from dap3d_core.assembly.evaluate import global_accelerations, rates, state_rates
+from dap3d_core.assembly.evaluate import copy, global_accelerations, rates, state_rates
 from dap3d_core.formulations import regularised
 from dap3d_core.formulations.common import constraints
 from dap3d_core.formulations.common.constraints import (
@@ -35,8 +35,7 @@ ROUGH = 1e-12
 @compiled_into
 def solve(system: System) -> None:
     """``acceleration`` and ``multipliers`` from the scaled forces in ``acceleration``."""
-    for k in range(system.gamma.shape[0]):
-        system.multipliers[k] = system.gamma[k]
+    copy(system.multipliers, system.gamma)
     solve_rows(system, system.acceleration)
 
 

@@ -2,13 +2,12 @@
 
 from typing import Any
 
-from dap3d_core.assembly.arrays import ENERGY, SCRATCH, TURNED, Floats, System
+from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.evaluate import (
-    call_kinds,
     evaluate_forces,
     global_accelerations,
-    rates,
-    state_rates,
+    put_rates,
+    report_energy,
 )
 from dap3d_core.assembly.state_update import normalise
 from dap3d_core.kernels.runtime.cache import compiled
@@ -17,10 +16,7 @@ from dap3d_core.kernels.runtime.cache import compiled
 @compiled
 def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """dy/dt of a state, the power of the forces last."""
-    power = evaluate_forces(t, y, system, loops)
-    rates(y, system.metric, system.acceleration, out)
-    state_rates(t, out, system, loops)
-    out[out.shape[0] - 1] = power
+    put_rates(t, y, evaluate_forces(t, y, system, loops), out, system, loops)
 
 
 @compiled
@@ -33,13 +29,8 @@ def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> Non
 @compiled
 def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """v_dot (6 n, global axes), angles, potential energy, zeros for the levels of constraints."""
-    value = system.settings[SCRATCH : SCRATCH + 1]
     last = out.shape[0] - 4
     evaluate_forces(t, y, system, loops)
     global_accelerations(system.metric, system.acceleration, out)
-    value[0] = 0.0
-    call_kinds(ENERGY, ENERGY, t, system, loops, value, value, value)
-    out[last] = value[0]
-    out[last + 1] = out[last + 2] = out[last + 3] = value[0] = 0.0
-    angles = out[6 * (system.body.shape[0] - 1) :]
-    call_kinds(TURNED, TURNED, t, system, loops, angles, value, value)
+    report_energy(t, out, system, loops)
+    out[last + 1] = out[last + 2] = out[last + 3] = 0.0

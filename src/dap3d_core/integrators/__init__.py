@@ -28,10 +28,6 @@ def explicit(
     return RungeKutta(method, functions, system, loops, y0, times, **options)
 
 
-def _explicit(name: str) -> Callable[..., Integration]:
-    return partial(explicit, TABLEAUS[name])
-
-
 def _adams(evaluator: Evaluator, y0: Any, times: Any, **options: Any) -> Integration:
     from dap3d_core.integrators.adams.integration import AdamsIntegration
 
@@ -93,10 +89,10 @@ class Integrator:
 INTEGRATORS = {
     integrator.name: integrator
     for integrator in (
-        Integrator("dopri5", _explicit("dopri5"), one_step=True),
-        Integrator("dop853", _explicit("dop853"), one_step=True, leaves_singular=True),
+        Integrator("dopri5", partial(explicit, DOPRI5), one_step=True),
+        Integrator("dop853", partial(explicit, DOP853), one_step=True, leaves_singular=True),
         Integrator("adams", _adams, requires="past accelerations on one smooth motion"),
-        Integrator("rk4", _explicit("rk4"), adaptive=False, one_step=True),
+        Integrator("rk4", partial(explicit, RK4), adaptive=False, one_step=True),
         Integrator(
             "radau", _radau, requires="the constraints themselves", prefers_body_coordinates=True
         ),

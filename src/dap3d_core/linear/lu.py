@@ -159,6 +159,8 @@ class LuPlan:
         body_first, joint_first, element_first: (bodies + 1,), (joint nodes,), (elements with
             states,) first unknown.
         fill: blocks that are zero before the factorisation.
+        place: (a, b) -> place of the block of rows of node a and columns of node b. Nodes are joint
+            nodes, then bodies, then elements with states.
     """
 
     size: int
@@ -170,38 +172,15 @@ class LuPlan:
     joint_first: Integers
     element_first: Integers
     fill: int
-    _place: dict[tuple[int, int], int]
-    _joint_count: int
+    place: dict[tuple[int, int], int]
 
-    def body_block(self, a: int, b: int) -> int:
-        """Place of the block of rows of body a and columns of body b (from 1)."""
-        j = self._joint_count - 1
-        return self._place[j + a, j + b]
+    def body(self, b: int) -> int:
+        """The node of body b (from 1)."""
+        return len(self.joint_first) + b - 1
 
-    def joint_blocks(self, k: int, b: int) -> tuple[int, int]:
-        """Places of the blocks (joint node k, body b) and (body b, joint node k)."""
-        j = self._joint_count - 1
-        return self._place[k, j + b], self._place[j + b, k]
-
-    def joint_block(self, k: int) -> int:
-        """Place of the diagonal block of joint node k."""
-        return self._place[k, k]
-
-    def element_blocks(self, e: int, b: int) -> tuple[int, int]:
-        """Places of the blocks (states of element e, body b) and (body b, these)."""
-        own, body = self._element(e), self._joint_count - 1 + b
-        return self._place[own, body], self._place[body, own]
-
-    def element_block(self, e: int) -> int:
-        """Place of the diagonal block of the states of element e."""
-        return self._place[self._element(e), self._element(e)]
-
-    def joint_element_block(self, k: int, e: int) -> int:
-        """Place of the block of rows of joint node k and columns of the states of element e."""
-        return self._place[k, self._element(e)]
-
-    def _element(self, e: int) -> int:
-        return self._joint_count + len(self.body_first) - 1 + e
+    def element(self, e: int) -> int:
+        """The node of the states of element e."""
+        return self.body(len(self.body_first) + e)
 
 
 class StateNode(NamedTuple):
@@ -303,5 +282,4 @@ def _lay_out(
         element_first=np.array(first[end:], dtype=np.int64),
         fill=2 * len(columns) - before,
         place=place,
-        joint_count=joints,
     )

@@ -8,12 +8,11 @@ import pytest
 from support.internals import Evaluator, correct_initial, join, split
 from support.motions import G, Motion
 from support.process import REPOSITORY
+from support.results import model_of
 from support.rotations import rotation, to_body
 
 import dap3d_core as dap
 from dap3d_core.formulations import RHS
-from dap3d_core.model import build_model
-from dap3d_core.scene import check
 
 REFERENCE = REPOSITORY / "tests/models/reference"
 #: Relative: condition numbers up to 1e5 of matrices that are inverted by another method.
@@ -81,7 +80,7 @@ def carousel_reference(kkt):
 
 def evaluator_of(scene):
     """The machine of a scene, which need not be assembled."""
-    model = build_model(check(scene, dap.load_registry()))
+    model = model_of(scene)
     return Evaluator(model, "standard" if model.row_count else "unconstrained")
 
 
@@ -273,7 +272,7 @@ def test_power_of_forces_and_drivers_is_the_rate_of_kinetic_energy(name, machine
 
 def test_without_joints_both_formulations_agree():
     """The standard formulation of a scene without rows gives the unconstrained accelerations."""
-    model = build_model(check(dap.load("bodies2"), dap.load_registry()))
+    model = model_of(dap.load("bodies2"))
     u = Motion(2, np.random.default_rng(1)).u(0.1)
     free, standard = (Evaluator(model, method) for method in ("unconstrained", "standard"))
     assert close(free.rhs(0.0, u), standard.rhs(0.0, u), 1e-15)

@@ -7,14 +7,13 @@ from support.internals import Evaluator, correct_initial
 from support.own_types import registry_of
 from support.plain import in_another_process, long_in_plain_python
 from support.process import run
+from support.results import model_of
 from support.rotations import rotation
 
 import dap3d_core as dap
 from dap3d_core.formulations import PROJECT, RHS
 from dap3d_core.interface import Joint, Point, Vector, number, point, vector
 from dap3d_core.kernels import cross, dot, eye, hstack, neg, normals, row, scale, skew, sub
-from dap3d_core.model import build_model
-from dap3d_core.scene import check
 
 REDUNDANT = {
     "door": mechanisms.door,
@@ -26,7 +25,7 @@ INDEPENDENT = {name: lambda name=name: dap.load(name) for name in ("pen2", "four
 
 
 def machines_of(scene, *methods, registry=None):
-    model = build_model(check(scene, registry or dap.load_registry()))
+    model = model_of(scene, registry)
     return [Evaluator(model, method) for method in methods]
 
 

@@ -33,7 +33,7 @@ def test_block_lu_solves_what_numpy_solves(number):
     size = [2 * node.rows for node in nodes] + [12] * 4
     dense = np.zeros((lu.size, lu.size), dtype=number)
     K = np.zeros(lu.matrix_size, dtype=number)
-    for (a, b), place in lu._place.items():
+    for (a, b), place in lu.place.items():
         block = rng.normal(size=(size[a], size[b])) + (4.0 * np.eye(size[a]) if a == b else 0.0)
         if number is complex:
             block = block + 1j * rng.normal(size=block.shape)

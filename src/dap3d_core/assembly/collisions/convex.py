@@ -166,8 +166,7 @@ def climb(shapes: PlacedShapes, i: int, j: int, edge: int, best: float, better: 
 
 @compiled
 def flat_directions(
-    shapes: PlacedShapes, i: int, j: int, edges_i: int, edges_j: int, count: int, best: float,
-    better: float,
+    shapes: PlacedShapes, i: int, j: int, edges_i: int, edges_j: int, best: float, better: float
 ) -> float:  # fmt: skip
     """Try normals of faces of hulls, and of pairs of edges."""
     work = shapes.work
@@ -246,7 +245,7 @@ def part_best(shapes: PlacedShapes, i: int, j: int, most: float) -> float:
         work[START, 2] = 1.0
     edges_i = edges_of(shapes, i, A, count, EI)
     edges_j = edges_of(shapes, j, B, count, EJ)
-    best = flat_directions(shapes, i, j, edges_i, edges_j, count, best, better)
+    best = flat_directions(shapes, i, j, edges_i, edges_j, best, better)
     for side in range(2):
         for e in range(edges_i if side == 0 else edges_j):
             edge = (EI if side == 0 else EJ) + e

@@ -5,6 +5,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from dap3d_core.assembly.metric import rotation_row, square_of
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import Arrays, IntegerMatrix, Matrix, Scalar
 from dap3d_core.kernels.runtime.cache import compiled
@@ -141,16 +142,10 @@ def place_shapes(s: PlacedShapes, poses: Floats, margin: Floats) -> None:
     for m in range(s.kind.size):
         b = s.body[m]
         pose, at, local, axes = poses[b], s.at[m], s.local[m], s.axes[m]
-        a, x, y, z = pose[3], pose[4], pose[5], pose[6]
-        h = 2.0 / ((a * a + x * x) + (y * y + z * z))
+        e = pose[3], pose[4], pose[5], pose[6]
+        h = 2.0 / square_of(e)
         for k in range(3):
-            u, v, w = (
-                (1.0 - h * (y * y + z * z), h * (x * y - z * a), h * (x * z + y * a))
-                if k == 0
-                else (h * (x * y + z * a), 1.0 - h * (x * x + z * z), h * (y * z - x * a))
-                if k == 1
-                else (h * (x * z - y * a), h * (y * z + x * a), 1.0 - h * (x * x + y * y))
-            )
+            u, v, w = rotation_row(e, h, k)
             s.centre[m, k] = pose[k] + (u * at[0] + v * at[1] + w * at[2])
             for c in range(3):
                 axes[3 * k + c] = u * local[c] + v * local[3 + c] + w * local[6 + c]

@@ -10,12 +10,9 @@ from typing import Any
 
 from dap3d_core.assembly.arrays import (
     ACCELERATION,
-    ENERGY,
     EVEN,
     LENGTH,
     POSITION,
-    SCRATCH,
-    TURNED,
     Floats,
     System,
 )
@@ -25,6 +22,7 @@ from dap3d_core.assembly.evaluate import (  # noqa: F401  read by projection.py
     largest_weighted,
     place,
     place_bodies,
+    report_energy,
     scale_velocities,
     zero,
 )
@@ -85,10 +83,18 @@ def factorise(system: System, part: float | None) -> int:
     Returns the number of pivots that have become small (``system.smallest``): the pose is near a
     singular one.
     """
-    assemble(system.targets, system.contributions, system.D, system.K)
     if part is not None:
         weigh_rows(system.blocks, system.D, part, system.compliance)
-        regularise(system.nodes, system.compliance, system.K)
+        return factorise_regularised(system)
+    assemble(system.targets, system.contributions, system.D, system.K)
+    return factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
+
+
+@compiled_into
+def factorise_regularised(system: System) -> int:
+    """As ``factorise``, with the ``compliance`` of the rows."""
+    assemble(system.targets, system.contributions, system.D, system.K)
+    regularise(system.nodes, system.compliance, system.K)
     return factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
 
 
@@ -147,21 +153,23 @@ def residuals(t: float, system: System, loops: Any) -> float:
 @compiled
 def velocity_residuals(system: System) -> float:
     """D v - nu into ``residual``, with the current D^; returns the largest, m/s."""
-    residual = system.residual
     scale_velocities(system.body, system.metric, system.velocity)
-    for k in range(residual.shape[0]):
-        residual[k] = -system.nu[k]
-    add_product(system.blocks, system.D, system.velocity, residual)
-    return largest_weighted(residual, system.weight)
+    return residual_of(system, system.velocity, system.nu)
 
 
 @compiled
 def acceleration_residual(system: System) -> float:
     """D a - gamma into ``residual``; returns the largest, m/s^2."""
+    return residual_of(system, system.acceleration, system.gamma)
+
+
+@compiled_into
+def residual_of(system: System, x: Floats, right: Floats) -> float:
+    """D x less its right-hand side into ``residual``; returns the largest."""
     residual = system.residual
     for k in range(residual.shape[0]):
-        residual[k] = -system.gamma[k]
-    add_product(system.blocks, system.D, system.acceleration, residual)
+        residual[k] = -right[k]
+    add_product(system.blocks, system.D, x, residual)
     return largest_weighted(residual, system.weight)
 
 
@@ -208,17 +216,11 @@ def report_levels(t: float, y: Floats, out: Floats, system: System, loops: Any) 
     The last four are the potential energy and the largest residuals of position, velocity and
     acceleration; before them are the angles whose turns are counted, those of joints last.
     """
-    value = system.settings[SCRATCH : SCRATCH + 1]
     last = out.shape[0] - 4
     out[last + 3] = acceleration_residual(system)
     out[last + 2] = velocity_residuals(system)
     out[last + 1] = residuals(t, system, loops)
-    value[0] = 0.0
-    call_kinds(ENERGY, ENERGY, t, system, loops, value, value, value)
-    out[last] = value[0]
-    value[0] = 0.0
-    angles = out[6 * (system.body.shape[0] - 1) + system.row.shape[0] :]
-    call_kinds(TURNED, TURNED, t, system, loops, angles, value, value)
+    report_energy(t, out, system, loops)
     report_turns(t, y, out[last - system.turns.shape[0] :], system)
 
 

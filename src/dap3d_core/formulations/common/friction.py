@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import FRICTION, JAMS, UNSETTLED, Floats, System
-from dap3d_core.assembly.evaluate import call_kinds, zero
+from dap3d_core.assembly.evaluate import add_force, call_kinds, copy, zero
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.scalar_math import where
 
@@ -47,30 +47,21 @@ def has_friction(system: System) -> bool:
 @compiled
 def store_applied_forces(system: System) -> None:
     """Remember the scaled applied forces before they become accelerations."""
-    for k in range(system.acceleration.shape[0]):
-        system.friction[k] = system.acceleration[k]
+    copy(system.friction[: system.acceleration.size], system.acceleration)
 
 
 @compiled
 def apply_friction(t: float, system: System, loops: Any) -> float:
     """Forces for ``multipliers``, added to the scaled applied forces; returns their power."""
-    body, metric, forces = system.body, system.metric, system.acceleration
-    size = forces.shape[0]
+    forces, size, power = system.acceleration, system.acceleration.shape[0], 0.0
     applied, friction = system.friction[:size], system.friction[size : 2 * size]
     zero(friction)
     call_kinds(
         FRICTION, FRICTION, t, system, loops, friction, system.multipliers, system.multipliers
     )
-    power = 0.0
-    for b in range(1, body.shape[0]):
-        s, k, o = body[b], metric[b], 6 * b
-        for c in range(6):
-            power += friction[o + c] * s[12 + c]
-        n0, n1, n2 = friction[o + 3], friction[o + 4], friction[o + 5]
-        for c in range(3):
-            forces[o + c] = applied[o + c] + k[0] * friction[o + c]
-            turned = k[7 + c] * n0 + k[10 + c] * n1 + k[13 + c] * n2
-            forces[o + 3 + c] = applied[o + 3 + c] + turned
+    copy(forces, applied)
+    for b in range(1, system.body.shape[0]):
+        power = add_force(b, friction, forces, system, power)
     return power
 
 
@@ -90,8 +81,7 @@ def accelerate_fixed_point(system: System, passes: int) -> bool:
     memory = system.friction[2 * system.force.shape[0] :]
     guess, result, change = memory[:rows], memory[rows : 2 * rows], memory[2 * rows : 3 * rows]
     if passes == 0:
-        for k in range(rows):
-            guess[k] = x[k]
+        copy(guess, x)
         return False
     size, largest_change, is_read = 0.0, 0.0, memory[(3 + 2 * DEPTH) * rows :]
     for k in range(rows):
@@ -116,8 +106,7 @@ def accelerate_fixed_point(system: System, passes: int) -> bool:
         share = projection(change, memory[o : o + rows])
         for k in range(rows):
             x[k] -= share * memory[o + rows + k]
-    for k in range(rows):
-        guess[k] = x[k]
+    copy(guess, x)
     return False
 
 

@@ -21,6 +21,7 @@ Dense, for as many contacts as touch in one place.
 import attrs
 import numpy as np
 
+from dap3d_core.assembly.evaluate import copy, largest, zero
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import Arrays, Matrix, Scalar
 from dap3d_core.kernels.runtime.cache import compiled
@@ -40,15 +41,11 @@ ADDED, CLOSER, STEPS = (1e-4, 1e-5, 1e-6), 1000, 40
 TINY = 1e-300
 
 
-def _integer() -> Scalar[int]:
-    return Scalar("integer")
-
-
 @attrs.define(eq=False, kw_only=True, slots=False)
 class Cone(Arrays):
     """A problem of ``count`` contacts, of m at most, and scratch."""
 
-    count = _integer()
+    count = Scalar[int]("integer")
 
     integer: Integers
     A: Matrix  # (3 m, 3 m), (3 m,) of u = A x + b
@@ -108,11 +105,9 @@ def solve_cone(c: Cone) -> float:
             break
     if not left <= SOLVED * scale:
         left = come_nearer(c, left, scale)
-    largest = 0.0
     for k in range(n):
         c.x[k] = z[k] * (c.ratio[k // 3] if k % 3 == 2 else 1.0)
-        largest = max(largest, abs(z[k]))
-    left += RESIDUAL_ROUNDING * largest  # without one x may grow
+    left += RESIDUAL_ROUNDING * largest(z)  # without one x may grow
     return left / scale if left < np.inf else np.inf
 
 
@@ -152,8 +147,7 @@ def come_nearer(c: Cone, left: float, scale: float) -> float:
     """Come nearer to a solution z by problems that are firmer; the residual."""
     n = 3 * c.count
     y, z, new, firm, moved = c.y[:n], c.z[:n], c.new[:n], c.firm, c.moved
-    for k in range(n):
-        y[k] = 0.0
+    zero(y)
     for part in ADDED:
         for _ in range(STEPS):
             total = 0.0
@@ -162,19 +156,16 @@ def come_nearer(c: Cone, left: float, scale: float) -> float:
             if (left <= SOLVED * scale) | (not total < np.inf):
                 return left
             for i in range(n):
-                for k in range(n):
-                    firm[i, k] = c.K[i, k]
+                copy(firm[i][:n], c.K[i])
                 firm[i, i] += part * c.K[i, i]
                 moved[i] = c.q[i] - part * c.K[i, i] * y[i]
             sweep(c, firm, moved, y, CLOSER)
             newton(c, firm, moved, y, scale)
-            for k in range(n):
-                new[k] = y[k]
+            copy(new, y)
             rest = newton(c, c.K, c.q, new, scale)
             if rest < left:
                 left = rest
-                for k in range(n):
-                    z[k] = new[k]
+                copy(z, new)
     return left
 
 
@@ -225,7 +216,7 @@ def sweep(c: Cone, A: Floats, b: Floats, x: Floats, sweeps: int) -> None:
     mu, r, more, free = c.mu, c.r, c.more, c.gapless
     size = x.shape[0]
     for _ in range(sweeps):
-        change = largest = 0.0
+        change = 0.0
         for j in range(c.count):
             k = 3 * j
             u0, u1, u2 = b[k], b[k + 1], b[k + 2]
@@ -249,9 +240,7 @@ def sweep(c: Cone, A: Floats, b: Floats, x: Floats, sweeps: int) -> None:
             z1, z2 = factor * z1, factor * z2
             change = max(change, abs(n - x[k]), abs(z1 - x[k + 1]), abs(z2 - x[k + 2]))
             x[k], x[k + 1], x[k + 2] = n, z1, z2
-        for q in range(size):
-            largest = max(largest, abs(x[q]))
-        if change <= RESIDUAL_ROUNDING * (largest + TINY):
+        if change <= RESIDUAL_ROUNDING * (largest(x) + TINY):
             break
 
 
@@ -262,10 +251,7 @@ def newton(c: Cone, A: Floats, b: Floats, x: Floats, scale: float) -> float:
     residual_of(c, A, b, x, False)
     best = largest_residual(c, n)
     for _ in range(PASSES):
-        largest = 0.0
-        for k in range(n):
-            largest = max(largest, abs(x[k]))
-        if (best <= RESIDUAL_ROUNDING * (largest + scale)) | (not best < np.inf):
+        if (best <= RESIDUAL_ROUNDING * (largest(x) + scale)) | (not best < np.inf):
             break
         residual_of(c, A, b, x, True)
         for k in range(n):
@@ -276,8 +262,7 @@ def newton(c: Cone, A: Floats, b: Floats, x: Floats, scale: float) -> float:
         if not size < best:
             break
         best = size
-        for k in range(n):
-            x[k] = c.trial[k]
+        copy(x, c.trial[:n])
     return best
 
 

@@ -10,7 +10,7 @@ coordinates.
 from typing import Any
 
 from dap3d_core.assembly.arrays import System
-from dap3d_core.assembly.evaluate import place, place_states
+from dap3d_core.assembly.evaluate import place, place_states, zero
 from dap3d_core.formulations import REPORT
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.contacts.contact_table import (
@@ -20,6 +20,7 @@ from dap3d_core.formulations.contacts.contact_table import (
     find_grips,
     put_outputs,
 )
+from dap3d_core.formulations.contacts.equations import NEAR, WAY
 from dap3d_core.formulations.contacts.forces import put_slip_against, size_across, still_speed
 from dap3d_core.formulations.contacts.impacts import (
     AT_REST,
@@ -35,10 +36,10 @@ from dap3d_core.formulations.contacts.rows import (
     add_scaled,
     change,
     lift,
-    move_on,
     put_feels,
     put_free,
     put_rows,
+    put_velocities,
     put_velocity,
     unscale,
 )
@@ -61,8 +62,6 @@ DEEPER = 100.0
 #: What was decided, or why nothing is: joints prescribe that a contact closes, friction jams,
 #: bodies overlap at the start, friction would drive, an impact has no impulses.
 DECIDED, PRESCRIBED, JAMMED, OVERLAPS, DRIVES, WEDGED = 0, 1, 2, 3, 4, 5
-#: Places of a mode, the direction of sliding and the share among the states of elements.
-MODE, WAY, NEAR = 0, 1, 4
 
 
 @compiled
@@ -100,8 +99,7 @@ def decide(
         return WEDGED
     if s.round_count > 0:
         stop_what_rests(s, system)
-    move_on(t, s, system, loops)
-    find_grips(t, s, system, tensions)
+    move_on(t, s, system, loops, tensions)
     if s.jammed >= 0:
         for c in range(s.jams.shape[0]):
             s.jams[c] = c == s.jammed
@@ -109,8 +107,7 @@ def decide(
         if not unjam(s, system):
             return blame(s)
         s.freed += 1
-        move_on(t, s, system, loops)
-        find_grips(t, s, system, tensions)
+        move_on(t, s, system, loops, tensions)
         for c in range(s.begins.shape[0]):
             s.begins[c] = s.leaves[c] = 0
         if not find_lasting(t, s, system, loops, functions, tensions):
@@ -118,6 +115,14 @@ def decide(
     settle(s, system)
     put_state(s, system)
     return DECIDED
+
+
+@compiled
+def move_on(t: float, s: ContactArrays, system: System, loops: Any, tensions: Any) -> None:
+    """Place the bodies with the present velocities, and find coefficients of friction there."""
+    put_velocities(s, system)
+    place(t, s.placed, system, loops)
+    find_grips(t, s, system, tensions)
 
 
 @compiled
@@ -154,8 +159,7 @@ def repeat(
         s.role[c], s.values[c] = s.mode[c] > 0.5, s.closing[c]
     lift(s)
     change(s, system)
-    for k in range(s.moved.shape[0]):
-        s.moved[k] = 0.0
+    zero(s.moved)
     are_same = not slide_sharing(s) or share_anew(t, s, system, loops, functions, tensions)
     for c in range(s.mode.shape[0]):
         size = size_across(s, c, s.slip[c])
@@ -191,8 +195,7 @@ def share_anew(
         if s.mode[c] > 0.5:
             s.in_touch[s.in_touch_count] = c
             s.in_touch_count += 1
-    move_on(t, s, system, loops)
-    find_grips(t, s, system, tensions)
+    move_on(t, s, system, loops, tensions)
     are_same = find_modes_now(t, s, system, loops, functions)
     for c in range(s.mode.shape[0]):
         are_same &= s.mode[c] == s.was[c]
@@ -204,7 +207,7 @@ def remember_modes(s: ContactArrays, system: System) -> None:
     """Modes before the instant."""
     place_states(s.y, system)
     for c in range(s.state.shape[0]):
-        s.was[c] = system.states[s.state[c] + MODE]
+        s.was[c] = system.states[s.state[c]]
 
 
 @compiled
@@ -384,8 +387,7 @@ def find_lasting(
         if not find_low(s):
             return True
         hold_low(s, system)
-        move_on(t, s, system, loops)
-        find_grips(t, s, system, tensions)
+        move_on(t, s, system, loops, tensions)
     return False
 
 
@@ -470,7 +472,7 @@ def put_state(s: ContactArrays, system: System) -> None:
     first = y.shape[0] - 1 - system.states.shape[0]
     for c in range(s.state.shape[0]):
         k = first + s.state[c]
-        y[k + MODE] = s.mode[c]
+        y[k] = s.mode[c]
         for i in range(3):
             y[k + WAY + i], y[k + NEAR + i] = s.way[c, i], s.near[c, i]
         work += s.work[c]

@@ -32,13 +32,14 @@ from dap3d_core.assembly.arrays import (
     System,
 )
 from dap3d_core.assembly.evaluate import (
+    add_force,
     call_kinds,
+    copy,
     evaluate_forces,
     global_accelerations,
     place,
     place_states,
-    rates,
-    state_rates,
+    put_rates,
     zero,
 )
 from dap3d_core.assembly.state_update import size_of_positions, size_of_velocities
@@ -79,8 +80,8 @@ LOADED, LOAD, LOADS, PUSHES, UNDER, COLUMNS = range(7, 13)
 LOAD_PASSES, LOAD_SETTLED = 50, 1e-14
 #: Places in a column, from its end: of its contact, of the normal force, of its power.
 PLACE, FORCE, POWER = 1, 2, 3
-#: Of a contact's states: mode; then the direction of sliding, and from here on what it is given.
-NEAR = 4
+#: Of a contact's states behind its mode: the direction of sliding, what it is given; how many.
+WAY, NEAR, OF_CONTACT = 1, 4, 7
 #: Modes (interface/contacts/rows.py) are above these.
 _OPEN, _SLIDING = 0.5, 1.5
 
@@ -107,8 +108,7 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
             power += force_of(t, c, force, system.acceleration, system, loops)
     if closed == 0 and system.row.shape[0] == 3 * contacts.shape[0]:
         return power
-    for k in range(size):
-        applied[k] = system.acceleration[k]
+    copy(applied, system.acceleration)
     given = largest_given(system)
     part = PART if given > 0.0 else PART_OF_INDEPENDENT
     factorise(system, part)
@@ -120,8 +120,7 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
         part = PART if part == PART_OF_INDEPENDENT else part * SMALLER
         factorise(system, part)
         count = add_columns(t, system, loops)
-        for k in range(size):
-            system.acceleration[k] = applied[k]
+        copy(system.acceleration, applied)
     for c in range(count):
         own = column(system, c)
         power += own[own.shape[0] - POWER] * own[own.shape[0] - FORCE]
@@ -199,21 +198,12 @@ def force_of(t: float, c: int, force: Floats, out: Floats, system: System, loops
     row = system.contacts[c]
     loop, x = loops[row[LOOP]], pointer(system.multipliers)
     for side in range(BODY_I, BODY_J + 1):
-        for k in range(6 * row[side], 6 * row[side] + 6):
-            force[k] = 0.0
+        zero(force[6 * row[side] : 6 * row[side] + 6])
     loop(t, system, row[INTEGERS], row[NUMBERS], 1, pointer(force), x, x)
     power = 0.0
     for side in range(BODY_I, BODY_J + 1):
-        b = row[side]
-        if b > 0:
-            s, metric, o = system.body[b], system.metric[b], 6 * b
-            n0, n1, n2 = force[o + 3], force[o + 4], force[o + 5]
-            for q in range(6):
-                power += force[o + q] * s[12 + q]
-            for q in range(3):
-                out[o + q] += metric[0] * force[o + q]
-                turned = metric[7 + q] * n0 + metric[10 + q] * n1 + metric[13 + q] * n2
-                out[o + 3 + q] += turned
+        if row[side] > 0:
+            power = add_force(row[side], force, out, system, power)
     return power
 
 
@@ -299,8 +289,7 @@ def add_pass(system: System, count: int, again: bool) -> None:
     kept = system.friction[size : 2 * size]
     for k in range(size if again else 0):
         kept[k] = system.acceleration[k]
-    for k in range(x.shape[0]):
-        x[k] = system.gamma[k]
+    copy(x, system.gamma)
     solve_rows(system, system.acceleration)
     N = pressing(system, count)
     for r in range(count):
@@ -431,8 +420,7 @@ def has_settled(system: System, count: int, given: float, part: float) -> bool:
         before = change
     if is_differentiated():
         add_pass(system, count, True)
-    for r in range(x.shape[0]):
-        x[r] = total[r]
+    copy(x, total)
     return change <= NOISE * (found + given)
 
 
@@ -446,10 +434,7 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
 @compiled
 def find_rates(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """dy/dt of a state, the power of forces and drivers last."""
-    power = accelerate(t, y, system, loops)
-    rates(y, system.metric, system.acceleration, out)
-    state_rates(t, out, system, loops)
-    out[out.shape[0] - 1] = power
+    put_rates(t, y, accelerate(t, y, system, loops), out, system, loops)
 
 
 @compiled

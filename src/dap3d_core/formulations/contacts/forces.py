@@ -5,6 +5,7 @@
 
 import math
 
+from dap3d_core.assembly.evaluate import zero
 from dap3d_core.formulations.contacts.cone import solve_cone
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.kernels.array_types import Floats
@@ -163,8 +164,7 @@ def solve_forces(s: ContactArrays, part: float, sticks: bool) -> bool:
     cone = s.cone
     cone.count = s.closed_count
     put_open(s)
-    for k in range(3 * s.closed_count):
-        cone.noise[k] = 0.0
+    zero(cone.noise[: 3 * s.closed_count])
     for k in range(s.closed_count):
         c = s.closed[k]
         mu = s.mu[c] if s.slipping[c] != 0 else s.mu_s[c]

@@ -11,6 +11,7 @@ touch, as through Newton's cradle. Where e is zero everywhere one round of all t
 # mypy: disable-error-code="no-any-return"
 
 from dap3d_core.assembly.arrays import System
+from dap3d_core.assembly.evaluate import copy, zero
 from dap3d_core.formulations.contacts.cone import solve_cone
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.contacts.forces import UNSOLVED, put_plain
@@ -69,8 +70,7 @@ def put_impulses(s: ContactArrays, e: Floats) -> bool:
         if s.newton[c] != 0:
             cone.b[3 * k] += e[c] * min(s.slip[c, 0], 0.0)
     left = solve_cone(cone)
-    for k in range(n):
-        s.x[k] = cone.x[k]
+    copy(s.x[:n], cone.x[:n])
     for k in range(s.closed_count):
         c = s.closed[k]
         if s.newton[c] == 0:  # friction of joints alone has none
@@ -102,8 +102,7 @@ def stop_slip(s: ContactArrays) -> bool:
     rank = factor_least(s.B, n, n, DEPENDENT, 0.0, s.w, s.order)
     solve_least(s.B, n, n, rank, s.w, s.order, s.x, cone.x)
     left = solve_cone(cone)
-    for k in range(n):
-        s.x[k] = cone.x[k]
+    copy(s.x[:n], cone.x[:n])
     for k in range(s.closed_count):
         pushes |= s.x[3 * k] > 0.0
     return pushes and left <= UNSOLVED
@@ -118,8 +117,7 @@ def collide(s: ContactArrays, system: System) -> bool:
     s.round_count, s.exchanged = 0, 0.0
     for c in range(s.state.shape[0]):
         s.work[c], s.rests_soon[c], s.is_low[c], s.role[c] = 0.0, 0, 0, 0
-        for i in range(3):
-            s.impulses[c, i] = 0.0
+        zero(s.impulses[c])
     for k in range(ROUNDS):
         if not take_part(s, k == ROUNDS - 1):
             break

@@ -3,6 +3,7 @@
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
+from dap3d_core.assembly.evaluate import largest, zero
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.contacts.forces import (
     ZERO,
@@ -102,21 +103,13 @@ def sort(numbers: Integers, count: int) -> None:
 
 
 @compiled
-def close_group(s: ContactArrays) -> None:
-    """Let the set that is worked on be the group."""
-    for k in range(s.group_count):
-        s.closed[k] = s.group[k]
-    s.closed_count = s.group_count
-
-
-@compiled
 def put_modes(s: ContactArrays) -> bool:
     """Find the modes of the group; False if it jams."""
-    close_group(s)
-    leaves = begins = 0
-    for k in range(s.closed_count):
-        leaves += s.leaves[s.closed[k]]
-        begins += s.begins[s.closed[k]]
+    leaves, begins, s.closed_count = 0, 0, s.group_count
+    for k in range(s.group_count):
+        c = s.closed[k] = s.group[k]
+        leaves += s.leaves[c]
+        begins += s.begins[c]
     if leaves + begins > 0:
         # of contacts that share, one at the end of its cone may only have to carry less
         if not put_matrix(s, False):
@@ -270,8 +263,7 @@ def let_leave(s: ContactArrays, count: int) -> None:
             else:
                 s.closed[s.closed_count] = c
                 s.closed_count += 1
-        for k in range(3 * s.closed_count):
-            s.cone.x[k] = 0.0
+        zero(s.cone.x[: 3 * s.closed_count])
         holds = put_matrix(s, True) and solve_without(s)
         without = s.closed_count
         if not holds or put_returning(s, -ZERO * big) > 0:
@@ -351,14 +343,12 @@ def put_found(s: ContactArrays, begins: bool, inner: bool, loose: bool) -> bool:
     if holds:
         for k in range(3 * s.closed_count):
             s.cone.x[k], s.rates[k] = s.inner[k], 0.0
-    largest, count = 0.0, 0
-    for k in range(3 * s.closed_count):
-        largest = max(largest, abs(s.cone.x[k]))
+    size, count = largest(s.cone.x[: 3 * s.closed_count]), 0
     for k in range(s.closed_count):
         count += s.cone.under[k] == k
     for k in range(s.closed_count):
         if s.under[s.closed[k]] < 0 or s.mode[s.under[s.closed[k]]] > 0.0:
-            put_one(s, k, shares, count == 1, ZERO * largest)
+            put_one(s, k, shares, count == 1, ZERO * size)
     if shares:
         leave_to_others(s)
     return True

@@ -13,11 +13,11 @@ import math
 from typing import Any
 
 from dap3d_core.assembly.arrays import ACCELERATION, System, velocity_offset
-from dap3d_core.assembly.evaluate import call_kinds, place, zero
-from dap3d_core.assembly.metric import in_body_axes
+from dap3d_core.assembly.evaluate import call_kinds, copy, place, zero
+from dap3d_core.assembly.metric import in_body_axes, put_scaled
 from dap3d_core.formulations import REPORT
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
-from dap3d_core.formulations.contacts.equations import BODY_I, BODY_J
+from dap3d_core.formulations.contacts.equations import BODY_I, BODY_J, OF_CONTACT
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.kernels.runtime.loop_support import JP, MASS
@@ -31,8 +31,6 @@ DEPENDENT_NORMALS = 1e-12
 CANCELLED, HELD = 1e-15, 1e-9
 #: Part of the mobilities of both, or of a joint, by which a contact feels a force.
 FELT = 1e-14
-#: Numbers of a contact among the states of elements: mode, way, near.
-OF_CONTACT = 7
 
 
 @compiled
@@ -58,8 +56,7 @@ def let_stick(s: ContactArrays, system: System) -> None:
     for c in range(s.state.shape[0]):
         first = s.state[c]
         system.states[first] = 2.0
-        for k in range(first + 1, first + OF_CONTACT):
-            system.states[k] = 0.0
+        zero(system.states[first + 1 : first + OF_CONTACT])
 
 
 @compiled
@@ -78,10 +75,7 @@ def put_jacobian(s: ContactArrays, system: System) -> None:
             arm = s.arm[(place - own) // 3] if place >= own else 1.0
             for i in range(6):
                 row[o + i] = arm * from_row[i]
-            for i in range(3):
-                scaled[o + i] = k[0] * row[o + i]
-                turning = row[o + 3] * k[7 + i] + row[o + 4] * k[10 + i] + row[o + 5] * k[13 + i]
-                scaled[o + 3 + i] = turning
+            put_scaled(k, row, o, scaled)
 
 
 @compiled
@@ -120,8 +114,7 @@ def put_moves(s: ContactArrays, system: System) -> None:
     own, n = s.lam_free.shape[0], s.v.shape[0]
     for i in range(s.free.shape[0]):
         row, moves = s.scaled[own + i], s.moves[i]
-        for k in range(n):
-            moves[k] = row[k]
+        copy(moves, row)
         for r in range(own):
             part = s.unit[r] * along_bodies(i // 3, row, s.scaled[r], system)
             answer = s.answers[r]
@@ -201,20 +194,12 @@ def put_slip(s: ContactArrays, system: System) -> None:
 def put_velocities(s: ContactArrays, system: System) -> None:
     """The state with the present velocities, into ``placed``; bodies are placed as in ``y``."""
     y, n = s.placed, system.body.shape[0] - 1
-    for k in range(y.shape[0]):
-        y[k] = s.y[k]
+    copy(y, s.y)
     for b in range(1, n + 1):
         o, f = 6 * b - 6, velocity_offset(b, n)
         y[f], y[f + 1], y[f + 2] = s.v[o], s.v[o + 1], s.v[o + 2]
         w = in_body_axes(system.body[b], s.v[o + 3], s.v[o + 4], s.v[o + 5])
         y[f + 3], y[f + 4], y[f + 5] = w
-
-
-@compiled
-def move_on(t: float, s: ContactArrays, system: System, loops: Any) -> None:
-    """Place the bodies with the present velocities."""
-    put_velocities(s, system)
-    place(t, s.placed, system, loops)
 
 
 @compiled
@@ -331,8 +316,7 @@ def keep_velocities(s: ContactArrays, system: System) -> None:
     s.taken_work = 0.0
     for b in range(1, system.body.shape[0]):
         s.taken_work += put_velocity(b, s, system)
-        for k in range(6 * b - 6, 6 * b):
-            s.moved[k] = 0.0
+        zero(s.moved[6 * b - 6 : 6 * b])
     s.y[s.y.shape[0] - 1] += s.taken_work
 
 
@@ -404,12 +388,10 @@ def put_held(s: ContactArrays, row: Floats, out: Floats, system: System) -> floa
     """A row along global axes, of unit length, less what the joints hold of it; its length."""
     square = 0.0
     for b in range(1, system.body.shape[0]):
-        m, o = system.metric[b], 6 * b - 6
-        for i in range(3):
-            out[o + i] = m[0] * row[o + i]
-            turning = row[o + 3] * m[7 + i] + row[o + 4] * m[10 + i] + row[o + 5] * m[13 + i]
-            out[o + 3 + i] = turning
-            square += out[o + i] * out[o + i] + turning * turning
+        o = 6 * b - 6
+        put_scaled(system.metric[b], row, o, out)
+        for i in range(o, o + 3):
+            square += out[i] * out[i] + out[i + 3] * out[i + 3]
     size = math.sqrt(square)
     for k in range(out.shape[0]):
         out[k] /= size

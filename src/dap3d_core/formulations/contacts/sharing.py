@@ -17,6 +17,7 @@ import math
 
 import numpy as np
 
+from dap3d_core.assembly.evaluate import copy, largest, zero
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.contacts.forces import (
     BOUNDLESS,
@@ -113,8 +114,7 @@ def are_held_inside(s: ContactArrays, resisting: bool) -> bool:
             return False
     if not is_left_to_rows(s):
         return False
-    for k in range(3 * s.closed_count):
-        s.inner[k] = s.cone.x[k]
+    copy(s.inner[: 3 * s.closed_count], s.cone.x)
     return True
 
 
@@ -125,8 +125,7 @@ def put_least(s: ContactArrays, resisting: bool) -> int:
     Returns how many of these there are; -1 where nothing holds.
     """
     n, A, x, K, count = put_own_rows(s), s.cone.A, s.cone.x, s.cone.K, 0
-    for k in range(3 * s.closed_count):
-        x[k] = 0.0
+    zero(x[: 3 * s.closed_count])
     for q in range(n):
         s.right[q] = -s.cone.b[s.rows[q]]
         for i in range(n if carries(s, s.rows[q], resisting) else 0):
@@ -135,8 +134,7 @@ def put_least(s: ContactArrays, resisting: bool) -> int:
     least = DEPENDENT * max(largest_entry(A, 3 * s.closed_count), most_mobile(s))
     rank = factor_least(s.B, n, count, 0.0, least, s.w, s.order)
     for k in range(3 * s.closed_count):
-        for i in range(count - rank + 1):
-            K[k, i] = 0.0
+        zero(K[k][: count - rank + 1])
     solve_least(s.B, n, count, rank, s.w, s.order, s.right, s.x)
     for i in range(-1, count - rank):
         if i >= 0:
@@ -166,15 +164,14 @@ def is_left_to_rows(s: ContactArrays) -> bool:
 
     Of weak rows that is more force than their own mobility tells.
     """
-    n, A, big = put_own_rows(s), s.cone.A, 0.0
+    n, A = put_own_rows(s), s.cone.A
     for i in range(n):
         s.x[i] = s.rates[s.rows[i]]
         for k in range(n):
             s.B[i, k] = A[s.rows[i], s.rows[k]]
     rank = factor_least(s.B, n, n, DEPENDENT, 0.0, s.w, s.order)
     solve_least(s.B, n, n, rank, s.w, s.order, s.x, s.right)
-    for k in range(3 * s.closed_count):
-        big = max(big, abs(s.cone.x[k]))
+    big = largest(s.cone.x[: 3 * s.closed_count])
     for q in range(n):
         if not abs(s.right[q]) <= OF_REST * rim_of(s, s.rows[q] // 3) + FORCE_ROUNDING * big:
             return False
@@ -189,9 +186,8 @@ def come_inside(s: ContactArrays, free: int) -> bool:
         s: with the least forces that hold, and vectors ``cone.K`` that may be added.
         free: how many of these there are.
     """
-    size, terms = 0.0, 5.0 * s.closed_count  # twice as many logarithms as cones, and forces
-    for k in range(3 * s.closed_count):
-        size = max(size, abs(s.cone.x[k]))
+    size = largest(s.cone.x[: 3 * s.closed_count])
+    terms = 5.0 * s.closed_count  # twice as many logarithms as cones, and forces
     t = farthest_outside(s)
     if not size > 0.0 or not t < np.inf:
         return False

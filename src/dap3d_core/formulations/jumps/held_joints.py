@@ -7,7 +7,7 @@ formulation. Compiled for scenes whose velocities jump, at the first jump.
 from typing import Any
 
 from dap3d_core.assembly.arrays import Floats, System, step_functions
-from dap3d_core.assembly.evaluate import place
+from dap3d_core.assembly.evaluate import copy, place
 from dap3d_core.formulations.common.constraints import (
     PART,
     acceleration_residual,
@@ -16,7 +16,7 @@ from dap3d_core.formulations.common.constraints import (
     linearise,
     velocity_residuals,
 )
-from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 #: Corrections of one solution. The first solves; the others are refinement and, with regularised
 #: factors, passes of the proximal method, each of which leaves a small part (regularised.py).
@@ -25,22 +25,25 @@ CORRECTIONS = 6
 FACTOR, SOLVE = 0, 1
 
 
-@compiled
-def factor_independent(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
-    """D^ and its factors at a state, and D v - nu into ``residual``; rows are independent."""
+@compiled_into
+def factor_rows(t: float, y: Floats, system: System, loops: Any, part: float | None) -> None:
+    """D^ and its factors at a state, and D v - nu into ``residual``."""
     place(t, y, system, loops)
     linearise(t, system, loops)
     velocity_residuals(system)
-    factorise_anyway(system, None)
+    factorise_anyway(system, part)
+
+
+@compiled
+def factor_independent(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """``factor_rows`` of rows that are independent."""
+    factor_rows(t, y, system, loops, None)
 
 
 @compiled
 def factor_regularised(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
-    """The same for rows that may depend on each other."""
-    place(t, y, system, loops)
-    linearise(t, system, loops)
-    velocity_residuals(system)
-    factorise_anyway(system, PART)
+    """``factor_rows`` of rows that may depend on each other."""
+    factor_rows(t, y, system, loops, PART)
 
 
 @compiled
@@ -54,8 +57,7 @@ def solve_held(t: float, y: Floats, out: Floats, system: System, loops: Any) -> 
     """Scaled impulses (6 n + 6) and changes of D v (rows) in out become scaled dv and -Lambda."""
     x, gamma, multipliers = system.acceleration, system.gamma, system.multipliers
     size, rows = x.shape[0], gamma.shape[0]
-    for k in range(size):
-        x[k] = out[k]
+    copy(x, out[:size])
     for k in range(rows):
         gamma[k], out[size + k] = out[size + k], 0.0
     for _ in range(CORRECTIONS):
@@ -65,8 +67,7 @@ def solve_held(t: float, y: Floats, out: Floats, system: System, loops: Any) -> 
             x[k] += system.change[k]
         for k in range(rows):
             out[size + k] += multipliers[k]
-    for k in range(size):
-        out[k] = x[k]
+    copy(out[:size], x)
 
 
 @compiled

@@ -125,7 +125,7 @@ class JumpElements:
             names = model.joint_names if type_kind == "joint" else model.force_names
             self.names += [f"{type_kind} {names[int(m)]}" for m in group.members]
             if kind == "reset":
-                self._add_resets(_state_places(evaluator, q, group), first, own)
+                self._add_resets(evaluator, q, first, own)
             else:
                 self._add_impulses(group, first, own)
 
@@ -136,10 +136,14 @@ class JumpElements:
         self._tables[order] += own.tolist()
         return place, len(own)
 
-    def _add_resets(self, places: Integers, first: int, own: Integers) -> None:
-        for k, states in enumerate(places):
-            start = int(states[0]) if len(states) else 0
-            row = [first + k, *self._switches(own[k], "reset_order"), start, len(states)]
+    def _add_resets(self, evaluator: Evaluator, q: int, first: int, own: Integers) -> None:
+        """Add the elements of loop q, whose states are reset."""
+        info, system = evaluator.loop_groups[q][1].type_info, evaluator.system
+        starts = system.idx[system.groups[q, 0] + info.layout.integers - 1 :: stride(info)]
+        count = info.layout.state_width
+        for k, switches in enumerate(own):
+            start = int(starts[k]) if count else 0
+            row = [first + k, *self._switches(switches, "reset_order"), start, count]
             self._tables["resets"].append(row)
 
     def _add_impulses(self, group: Group, first: int, own: Integers) -> None:
@@ -194,11 +198,3 @@ class JumpElements:
         )  # fmt: skip
         found.most_rounds = rounds
         return found
-
-
-def _state_places(evaluator: Evaluator, q: int, group: Group) -> Integers:
-    """(count, m) places of the states of the elements of loop q."""
-    layout, system = group.type_info.layout, evaluator.system
-    width = stride(group.type_info)
-    first = system.idx[system.groups[q, 0] + layout.integers - 1 :: width][: group.count]
-    return first[:, None] + np.arange(layout.state_width)

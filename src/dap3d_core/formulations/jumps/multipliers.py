@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from dap3d_core.assembly.evaluate import largest, zero
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -36,18 +37,16 @@ def find_impulses(
         pushes: (m,) 1 of rows that push, 0 of others.
         acts, space: scratch, (m,) and (2, m, m).
     """
-    largest = 0.0
     pulls = 0
     for k in range(m):
         acts[k] = 1
     least_solution(m, A, x[0], acts, x[1], space)
     for k in range(m):
-        largest = max(largest, abs(x[0, k]))
         if (pushes[k] != 0) & (x[1, k] < 0.0):
             pulls = 1
     if pulls == 0:
         return
-    seek_active(m, A, x, pushes, acts, space, ZERO * largest)
+    seek_active(m, A, x, pushes, acts, space, ZERO * largest(x[0][:m]))
     for k in range(m):
         acts[k] = 1 - pushes[k] if x[2, k] <= 0.0 else 1
     least_solution(m, A, x[0], acts, x[1], space)
@@ -98,16 +97,14 @@ def missed_row(m: int, A: Floats, x: Floats, pushes: Integers) -> int:
 
     Arguments as of ``find_impulses``.
     """
-    largest = 0.0
-    for k in range(m):
-        largest = max(largest, abs(x[0, k]))
+    size = largest(x[0][:m])
     for k in range(m):
         left = -x[0, k]
         for q in range(m):
             left += A[k, q] * x[1, q]
         if pushes[k] != 0:
             left = min(left, 0.0)
-        if abs(left) > MISS * largest:
+        if abs(left) > MISS * size:
             return k
     return -1
 
@@ -124,8 +121,7 @@ def least_solution(m: int, A: Floats, b: Floats, acts: Integers, x: Floats, spac
         for k in range(m):
             S[i, k] = 0.5 * (A[i, k] + A[k, i]) if (acts[i] != 0) & (acts[k] != 0) else 0.0
     diagonalise(m, S, V)
-    for k in range(m):
-        x[k] = 0.0
+    zero(x[:m])
     for q in range(m):
         if S[q, q] > FREEDOM:
             part = 0.0

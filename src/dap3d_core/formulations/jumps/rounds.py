@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import IMPULSE, KNOT, RESET, SWITCH, System, velocity_offset
-from dap3d_core.assembly.evaluate import call_kinds, place, zero
+from dap3d_core.assembly.evaluate import call_kinds, copy, place, zero
+from dap3d_core.assembly.metric import put_scaled
 from dap3d_core.formulations.jumps.held_joints import FACTOR, SOLVE
 from dap3d_core.formulations.jumps.jump_arrays import (
     BEFORE,
@@ -147,8 +148,7 @@ def find_rows(t: float, j: JumpArrays, system: System, loops: Any) -> int:
     asks = 0
     for k in range(j.kicks.shape[0]):
         asks |= kick(j, k)
-    for k in range(6):
-        j.P[k] = 0.0
+    zero(j.P[:6])
     j.row_count = 0
     for k in range(j.rows.shape[0]):
         change = j.numbers[j.rows[k, CHANGE]]
@@ -158,8 +158,7 @@ def find_rows(t: float, j: JumpArrays, system: System, loops: Any) -> int:
                 add_row(j, k, j.rows[k, PUSHES])
     if j.rounds == 0:
         for k in range(j.given_count):
-            for i in range(j.given.shape[1]):
-                j.G[j.row_count, i] = j.given[k, i]
+            copy(j.G[j.row_count], j.given[k])
             j.which[j.row_count], j.pushes[j.row_count] = -1, 0
             j.row_count += 1
     return asks | (j.row_count > 0)
@@ -261,13 +260,11 @@ def unit_rows(j: JumpArrays, of_held: Any, held: System, held_loops: Any) -> Non
         j.length[q] = length = length if length > 0.0 else 1.0
         for c in range(size):
             j.scaled[q, c] /= length
-        for c in range(size):
-            j.solution[c] = j.scaled[q, c]
+        copy(j.solution[:size], j.scaled[q])
         for k in range(j.residual.shape[0]):
             j.solution[size + k] = 0.0
         solve(0.0, j.y, j.solution, held, held_loops)
-        for c in range(size):
-            j.x[q, c] = j.solution[c]
+        copy(j.x[q], j.solution[:size])
         for k in range(j.residual.shape[0]):
             j.held[q, k] = j.solution[size + k]
     for q in range(m):
@@ -282,11 +279,7 @@ def unit_rows(j: JumpArrays, of_held: Any, held: System, held_loops: Any) -> Non
 def scale(held: System, G: Floats, out: Floats) -> None:
     """Scaled impulses or rows of those in global axes: G M^(-1/2)."""
     for b in range(held.metric.shape[0]):
-        k, o = held.metric[b], 6 * b
-        for c in range(3):
-            out[o + c] = k[0] * G[o + c]
-            turning = G[o + 3] * k[7 + c] + G[o + 4] * k[10 + c] + G[o + 5] * k[13 + c]
-            out[o + 3 + c] = turning
+        put_scaled(held.metric[b], G, 6 * b, out)
 
 
 @compiled
@@ -337,8 +330,7 @@ def remember(j: JumpArrays, q: int, Lam: float) -> None:
         j.acting[j.rows[k, ELEMENT]] = 1
     if (k >= 0) & (j.pushes[q] != 0):
         j.is_touched[k] = 1
-        for c in range(j.touched.shape[1]):
-            j.touched[k, c] = j.G[q, c]
+        copy(j.touched[k], j.G[q])
 
 
 @compiled

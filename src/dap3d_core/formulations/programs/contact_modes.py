@@ -3,12 +3,9 @@
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, Integers
-from dap3d_core.formulations.contacts.equations import NEAR, STATE
+from dap3d_core.formulations.contacts.equations import NEAR, STATE, WAY
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.contacts.rows import SLIDES
-
-#: Of a contact's states: the first component of the direction of sliding.
-WAY = 1
 
 
 def mode_states(evaluator: Evaluator, y: Floats) -> tuple[Integers, Floats]:

@@ -32,7 +32,7 @@ from dap3d_core.assembly.arrays import Floats, Integers, System
 from dap3d_core.assembly.evaluate import largest, zero
 from dap3d_core.assembly.metric import in_body_axes, scaled_moment
 from dap3d_core.kernels.runtime.array_struct import Arrays, IntegerMatrix
-from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop
 from dap3d_core.kernels.runtime.loop_support import A, P, R, V, W
 
@@ -173,8 +173,7 @@ def call_element(t: float, e: int, q: int, system: System, loops: Any, tangent: 
     i0, p0 = system.groups[g, 0] + q * row[STRIDE], system.groups[g, 1] + q * row[PAR_WIDTH]
     place, force, D, x = (i0, p0, 1), tangent.force, tangent.D, tangent.minus_lambda
     for n in range(slots):
-        for c in range(6 * WIDTH * idx[i0 + n], 6 * WIDTH * (idx[i0 + n] + 1)):
-            force[c] = 0.0
+        zero(force[6 * WIDTH * idx[i0 + n] : 6 * WIDTH * (idx[i0 + n] + 1)])
     if kind == POSITION_ELEMENT:
         call_loop(loops, row[DERIVATIVE], t, wide, place, tangent.gamma, x, x)
         first = WIDTH * idx[i0 + row[ROW_AT]]
@@ -384,6 +383,16 @@ def scale_columns(block: Floats, o: int, k: Floats, s: Floats) -> None:
     block[o + 3], block[o + 4], block[o + 5] = x, y, z
 
 
+@compiled_into
+def scale_column(block: Floats, c: int, n: int, k: Floats, s: Floats) -> None:
+    """Six numbers, each n behind the one before, a force and a moment in body axes, scaled."""
+    x, y, z = in_body_axes(s, block[c], block[c + n], block[c + 2 * n])
+    block[c], block[c + n], block[c + 2 * n] = k[0] * x, k[0] * y, k[0] * z
+    c += 3 * n
+    x, y, z = scaled_moment(k, block[c], block[c + n], block[c + 2 * n])
+    block[c], block[c + n], block[c + 2 * n] = x, y, z
+
+
 @compiled
 def scale_tangent(system: System, tangent: Tangent) -> None:
     """Rows and columns of the derivatives into the bodies' scaled coordinates."""
@@ -395,10 +404,7 @@ def scale_tangent(system: System, tangent: Tangent) -> None:
             scale_columns(block, o + 12 * r, metric[b], system.body[b])
             scale_columns(block, o + 12 * r + 6, metric[b], system.body[b])
         for c in range(o, o + 12):
-            x, y, z = in_body_axes(s, block[c], block[c + 12], block[c + 24])
-            block[c], block[c + 12], block[c + 24] = k[0] * x, k[0] * y, k[0] * z
-            x, y, z = scaled_moment(k, block[c + 36], block[c + 48], block[c + 60])
-            block[c + 36], block[c + 48], block[c + 60] = x, y, z
+            scale_column(block, c, 12, k, s)
     for q in range(system.blocks.shape[0]):
         o, b = system.blocks[q, 0], system.blocks[q, 1]
         for _ in range(system.blocks[q, 2]):

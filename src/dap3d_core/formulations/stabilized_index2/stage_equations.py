@@ -27,7 +27,7 @@ from dap3d_core.assembly.arrays import (
     states_offset,
     velocity_offset,
 )
-from dap3d_core.assembly.evaluate import evaluate_forces, rates, state_rates, zero
+from dap3d_core.assembly.evaluate import copy, evaluate_forces, put_rates, zero
 from dap3d_core.assembly.metric import in_body_axes, scaled, scaled_moment, unscaled
 from dap3d_core.assembly.state_update import add_displacement
 from dap3d_core.formulations.common.constraints import (
@@ -116,9 +116,7 @@ def evaluate_stage(
         store_applied_forces(system)
         power += apply_friction(t, system, loops)
     add_transposed(system.blocks, system.D, x, -1.0, system.acceleration)
-    rates(y, system.metric, system.acceleration, out)
-    state_rates(t, out, system, loops)
-    out[out.shape[0] - 1] = power + power_of_drivers(system)
+    put_rates(t, y, power + power_of_drivers(system), out, system, loops)
     zero(system.change)
     add_transposed(system.blocks, system.D, mu, 1.0, system.change)
     add_displacement(y, system.metric, system.change, out)
@@ -126,8 +124,7 @@ def evaluate_stage(
     for k in range(x.shape[0]):
         rows[0, k] = system.residual[k] if held[k] != 0 else mu[k]
     velocity_residuals(system)
-    for k in range(x.shape[0]):
-        rows[1, k] = system.residual[k]
+    copy(rows[1], system.residual)
 
 
 @compiled
@@ -136,8 +133,7 @@ def keep_state(system: System, matrix: StageMatrix, part: float) -> None:
     for q in range(system.blocks.shape[0]):
         s = system.body[system.blocks[q, 1]]
         for o in range(system.blocks[q, 0], system.blocks[q, 0] + 6 * system.blocks[q, 2], 6):
-            for c in range(o, o + 6):
-                matrix.D[c] = system.D[c]
+            copy(matrix.D[o : o + 6], system.D[o : o + 6])
             turn_to_body(matrix.D, o, s)
     zero(matrix.compliance)
     for q in range(system.blocks.shape[0] if part > 0.0 else 0):

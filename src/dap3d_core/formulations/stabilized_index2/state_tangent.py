@@ -18,7 +18,6 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import Integers, System
 from dap3d_core.assembly.evaluate import zero
-from dap3d_core.assembly.metric import in_body_axes, scaled_moment
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.stabilized_index2 import jacobian
 from dap3d_core.formulations.stabilized_index2.jacobian import (
@@ -26,6 +25,7 @@ from dap3d_core.formulations.stabilized_index2.jacobian import (
     Tangent,
     call_element,
     clear,
+    scale_column,
     scale_columns,
     seed_positions,
     seed_velocities,
@@ -137,11 +137,6 @@ def _state_tangent(model: Model, at: Sequence[int]) -> StateTangent:
         record=record,
         values=np.zeros(size),
     )
-
-
-def coupled_bodies(tangent: Tangent) -> list[tuple[int, int]]:
-    """Pairs of different bodies that an element couples."""
-    return [(int(a), int(b)) for _, a, b in tangent.blocks if a != b]
 
 
 def _joints_read(group: Group) -> list[Integers]:
@@ -283,10 +278,7 @@ def scale_state_tangent(system: System, tangent: Tangent) -> None:
                     scale_columns(v, o + 12 * c + 6, k, s)
                 o = record[jacobian.FORCE_BY_STATE] + 6 * m * n
                 for c in range(o, o + m if b > 0 else o):
-                    f0, f1, f2 = in_body_axes(s, v[c], v[c + m], v[c + 2 * m])
-                    v[c], v[c + m], v[c + 2 * m] = k[0] * f0, k[0] * f1, k[0] * f2
-                    c3, c4, c5 = c + 3 * m, c + 4 * m, c + 5 * m
-                    v[c3], v[c4], v[c5] = scaled_moment(k, v[c3], v[c4], v[c5])
+                    scale_column(v, c, m, k, s)
 
 
 @compiled

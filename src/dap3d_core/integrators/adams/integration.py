@@ -7,14 +7,15 @@ import numpy as np
 
 from dap3d_core.integrators.adams.step import (
     CONSTANT,
+    HIGHEST,
     ROWS,
     AdamsState,
     advance_adams,
-    allowed_adams_integers,
     make_table,
     state_at,
 )
 from dap3d_core.integrators.stepping.integration import Integration
+from dap3d_core.integrators.stepping.integration_state import MOST_COUNTED
 from dap3d_core.integrators.stepping.restore import restored
 from dap3d_core.kernels.array_types import Floats
 
@@ -70,7 +71,12 @@ class AdamsIntegration(Integration):
 
     def allowed_integers(self, found: Mapping[str, int]) -> dict[str, Container[int]]:
         """As ``Integration.allowed_integers``."""
-        return super().allowed_integers(found) | allowed_adams_integers(found)
+        return super().allowed_integers(found) | {
+            "next_order": range(1 if found["first_stage_valid"] else 0, HIGHEST + 1),
+            "last_order": range(HIGHEST + 1),
+            "is_starting": (0, 1),
+            **dict.fromkeys(("equal_steps", "failure_count"), range(MOST_COUNTED)),
+        }
 
     def state_within(self, t: float) -> Floats | None:
         """As ``Integration.state_within``."""

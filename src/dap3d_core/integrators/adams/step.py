@@ -10,12 +10,13 @@ whose notation this is written) and III.7.
 """
 
 import math
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import attrs
 import numpy as np
 
+from dap3d_core.assembly.evaluate import zero
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.event_location import (
     end_is_across,
@@ -24,15 +25,15 @@ from dap3d_core.integrators.stepping.event_location import (
     update_switches_after_step,
 )
 from dap3d_core.integrators.stepping.integration_state import Function, IntegrationState
-from dap3d_core.integrators.stepping.output import may_step, project_state
-from dap3d_core.integrators.stepping.rounding import record_failure, update_rounding
+from dap3d_core.integrators.stepping.output import project_state
+from dap3d_core.integrators.stepping.rounding import record_failure
 from dap3d_core.integrators.stepping.step_control import (
     EPSILON,
     FROM_END,
     LARGEST,
     STEP_FOR_TURNS,
     STRETCH,
-    count_turns,
+    advance_by,
     first_step,
     step_floor,
     turns_are_certain,
@@ -65,15 +66,6 @@ PSI, PSI_NEXT, BETA_ROW, G_ROW, SIGMA, LINE, CONSTANT, WITHIN, TABLE_ROWS = rang
 EQUAL_TO = 1e-11
 
 
-def _error_constants() -> Floats:
-    """gamma*_j, j = 0, 1, ...: sum over i of gamma*_i / (j + 1 - i) = 0, HNW III (1.14)."""
-    constants = np.zeros(ROWS + HIGHEST)
-    constants[0] = 1.0
-    for j in range(1, ROWS + 1):
-        constants[j] = -sum(constants[i] / (j + 1 - i) for i in range(j))
-    return np.abs(constants)
-
-
 @attrs.define(eq=False, kw_only=True, slots=False)
 class AdamsState(IntegrationState):
     """State of an integration by Adams methods; n components."""
@@ -89,20 +81,14 @@ class AdamsState(IntegrationState):
     table: Matrix  # (TABLE_ROWS, ROWS + HIGHEST)
 
 
-def allowed_adams_integers(found: Mapping[str, int]) -> dict[str, Container[int]]:
-    """Values of these integers between two chunks of a run, as ``allowed_integers`` has them."""
-    return {
-        "next_order": range(1 if found["first_stage_valid"] else 0, HIGHEST + 1),
-        "last_order": range(HIGHEST + 1),
-        "is_starting": (0, 1),
-        **dict.fromkeys(("equal_steps", "failure_count"), range(at.MOST_COUNTED)),
-    }
-
-
 def make_table() -> Floats:
     """The table before the first step."""
     table = np.zeros((TABLE_ROWS, ROWS + HIGHEST))
-    table[CONSTANT] = _error_constants()
+    constants = table[CONSTANT]  # sum over i of gamma*_i / (j + 1 - i) = 0, HNW III (1.14)
+    constants[0] = 1.0
+    for j in range(1, ROWS + 1):
+        constants[j] = -sum(constants[i] / (j + 1 - i) for i in range(j))
+    table[CONSTANT] = np.abs(constants)
     return table
 
 
@@ -231,8 +217,7 @@ def interpolate(work: AdamsState, back: float, out: Floats) -> None:
         for q in range(last - j):
             line[q] = gamma * line[q] - eta * line[q + 1]
         g[j], before = line[0], psi[j]
-    for i in range(out.size):
-        out[i] = 0.0
+    zero(out)
     for j in range(last - 1, -1, -1):
         for i in range(out.size):
             out[i] += g[j] * differences[j, i]
@@ -245,16 +230,8 @@ def advance_adams(
     work: AdamsState, functions: Sequence[Function], system: Any, loops: Any, budget: int
 ) -> None:
     """Integrate as ``runge_kutta.advance`` does; functions and budget as there."""
-    rhs, project, report = functions[0], functions[1], functions[2]
-    watch = functions[4] if work.switch_count != 0 else rhs
-    accepted = functions[3] if work.calls_accepted != 0 else rhs
-    limit = work.rhs_count + budget
-    while may_step(work, state_at, limit, project, report, system, loops):
-        steps, rejected, h = work.step_count, work.rejected_count, work.h
-        step(work, (rhs, project, accepted, watch), system, loops)
-        update_rounding(work, work.differences[0], h, rejected, rhs, system, loops)
-        if work.calls_accepted != 0 and work.step_count > steps:
-            count_turns(work, accepted, system, loops, FROM_END)
+    first = work.differences[0]
+    advance_by(step, state_at, work, first, functions, system, loops, budget, FROM_END)
 
 
 @compiled
@@ -277,8 +254,7 @@ def begin(work: AdamsState, rhs: Function, system: Any, loops: Any) -> None:
     if work.h == 0.0:
         longest = FIRST_PART * (work.times[-1] - work.times[0])
         work.h = with_slopes(min(first_step(work, f, rhs, system, loops), longest), 0.0)
-    for i in range(y.size):
-        f[1, i] = 0.0
+    zero(f[1])
     for j in range(ROWS):
         work.table[PSI, j] = j * work.h
     work.next_order, work.is_starting, work.equal_steps = 1, 1, 0

@@ -37,16 +37,13 @@ LIGHT = 1e-3
 #: Unknowns up to which the problem of contacts beside joints is solved alone: those of three. Four
 #: may share what they carry, and it gave two feet of a quadruped 67 N, the others 1.
 SMALL_SIZE = 9
+#: Unknowns up to which the matrix of a pass is a square; that of more has blocks.
+DENSE_SIZE = 60
 #: Kinds of contacts: with a cone; friction of a joint, or of what rolls, along rows 1 and 2; of a
 #: joint along all three.
 CONE, ALONE, WHOLE = range(3)
 #: What a contact does in a step: it collides, and comes to a stop or bounces; or it stays closed.
 STOPS, BOUNCES, STAYS = 1, 2, 3
-#: Arrays of which a row belongs to a contact.
-OF_CONTACTS = ("bodies", "key", "kind", "under", "group", "next_contact", "chosen", "J",
-               "moved", "own", "own_held", "gap", "mu", "rim", "e", "bias", "r", "collides",
-               "closing", "x", "u", "z", "B", "B_factored", "push", "kept", "missing", "met",
-               "x_bounce")  # fmt: skip
 
 
 def _integer() -> Scalar[int]:
@@ -219,14 +216,13 @@ class StepArrays(Arrays):
     small_step: Floats
 
 
-def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: int) -> StepArrays:
+def step_arrays(evaluator: Evaluator, size: int, remembered: int) -> StepArrays:
     """The arrays of a model.
 
     Args:
         evaluator: of the model.
         size: numbers of its integrated state.
         remembered: impulses that are kept from step to step.
-        dense_size: unknowns up to which matrices are squares.
     """
     model = evaluator.model
     n, k = model.body_count, model.joint_row_count
@@ -251,13 +247,13 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
         **scratch,
         slopes=np.zeros(2 * size),
         slots=np.zeros(2 * remembered + 1, dtype=np.int64),
-        K=np.zeros(min(6 * n, dense_size) ** 2),
-        exchanged=np.zeros(max(dense_size, 6), dtype=np.int64),
+        K=np.zeros(min(6 * n, DENSE_SIZE) ** 2),
+        exchanged=np.zeros(max(DENSE_SIZE, 6), dtype=np.int64),
         change=np.zeros(6 * n),
         turned=np.zeros(36),
         log=np.zeros((LOG_ROOM, MET)),
     )
-    arrays.dense_size, arrays.length = dense_size, model.length
+    arrays.dense_size, arrays.length = DENSE_SIZE, model.length
     arrays.first_v_dot, arrays.first_lam = layout["v_dot"].start, layout["Lam"].start
     arrays.first_state = layout["states"].start
     if model.collisions is not None and model.collisions.resists_turning:
@@ -313,15 +309,16 @@ def _of_bodies(model: Model) -> dict[str, Any]:
 
 def _of_contacts(room: int) -> dict[str, Any]:
     """Arrays of so many contacts."""
-    widths = {"bodies": 2, "J": 36, "moved": 36, "met": MET,
+    widths = {"J": 36, "moved": 36, "met": MET,
               **dict.fromkeys(("own", "own_held", "B", "B_factored"), 9),
               **dict.fromkeys(("x", "u", "z", "bias", "push", "kept", "missing", "x_bounce"),
                               3)}  # fmt: skip
-    whole = ("bodies", "key", "kind", "under", "group", "next_contact", "chosen", "collides")
     return {
-        name: np.zeros((room, widths[name]) if name in widths else room,
-                       dtype=np.int64 if name in whole else float)
-        for name in OF_CONTACTS
+        "bodies": np.zeros((room, 2), dtype=np.int64),
+        **{name: np.zeros(room, dtype=np.int64) for name in (
+            "key", "kind", "under", "group", "next_contact", "chosen", "collides")},
+        **{name: np.zeros(room) for name in ("gap", "mu", "rim", "e", "r", "closing")},
+        **{name: np.zeros((room, width)) for name, width in widths.items()},
     }  # fmt: skip
 
 

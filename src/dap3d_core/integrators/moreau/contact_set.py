@@ -9,18 +9,19 @@ from typing import Any
 from dap3d_core.assembly.arrays import ACCELERATION, POSITION, System
 from dap3d_core.assembly.collisions.find import find_touches, touch
 from dap3d_core.assembly.collisions.placed_shapes import place_shapes
-from dap3d_core.assembly.evaluate import call_kinds, place
+from dap3d_core.assembly.evaluate import call_kinds, copy, place, zero
+from dap3d_core.assembly.metric import put_rotation, rotation_row, square_of
 from dap3d_core.formulations.contacts.equations import (
     BODY_I,
     INTEGERS,
     LOOP,
+    NEAR,
     NUMBERS,
     ROW,
     STATE,
     UNDER,
 )
 from dap3d_core.integrators.moreau.arrays import ALONE, CONE, STAYS, StepArrays
-from dap3d_core.integrators.stepping.vector_ops import copy
 from dap3d_core.interface.contacts.rows import FAR_APART, SLIDES, STEPPED
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.array_struct import pointer
@@ -34,8 +35,6 @@ POINTS = 256
 THIN = 1e-9
 #: What slides by more than its slip changes by within a step, times this, does not come to rest.
 SLIDES_ON = 0.5
-#: Of the states of a contact after its mode and way, what is nearest.
-NEAREST = 4
 
 
 @compiled
@@ -92,8 +91,7 @@ def turn_rows(t: float, y: Floats, s: StepArrays, system: System, loops: Any) ->
         place_shapes(shapes, s.poses, s.margin)
     last = first
     for c in range(s.law_count):
-        for k in range(36):
-            s.moved[c, k] = s.J[c, k]
+        copy(s.moved[c], s.J[c])
         if c >= first:
             if s.kind[c] != CONE or s.collides[c] == STAYS:
                 put_rows(c, s, system)
@@ -138,8 +136,7 @@ def put_turned_bias(c: int, s: StepArrays) -> None:
     if s.bodies[c, 0] == 0:
         side, sign = 6, -1.0
     slip[0], slip[1], slip[2] = velocity_of(s, c, s.before)
-    for k in range(3):
-        more[k] = 0.0
+    zero(more[:3])
     size = change = 0.0
     for r in range(3):
         u, was = 0.0, 0.0
@@ -176,8 +173,8 @@ def put_inertia(s: StepArrays) -> None:
     """Put moments of inertia of the bodies as placed, in global axes."""
     A = s.turned
     for b in range(1, s.poses.shape[0]):
-        for k in range(3):
-            A[3 * k], A[3 * k + 1], A[3 * k + 2] = axes_of(s.poses[b], k)
+        e = s.poses[b, 3], s.poses[b, 4], s.poses[b, 5], s.poses[b, 6]
+        put_rotation(A, 0, e, 2.0 / square_of(e))
         turn_tensor(A, s.Jp[b], s.spin[b])
         turn_tensor(A, s.Jp_inverse[b], s.spin_inverse[b])
 
@@ -185,13 +182,8 @@ def put_inertia(s: StepArrays) -> None:
 @compiled
 def axes_of(p: Floats, k: int) -> tuple[float, float, float]:
     """Row k of the rotation matrix of a pose, whose Euler parameters may have any length."""
-    a, x, y, z = p[3], p[4], p[5], p[6]
-    h = 2.0 / ((a * a + x * x) + (y * y + z * z))
-    if k == 0:
-        return 1.0 - h * (y * y + z * z), h * (x * y - z * a), h * (x * z + y * a)
-    if k == 1:
-        return h * (x * y + z * a), 1.0 - h * (x * x + z * z), h * (y * z - x * a)
-    return h * (x * z - y * a), h * (y * z + x * a), 1.0 - h * (x * x + y * y)
+    e = p[3], p[4], p[5], p[6]
+    return rotation_row(e, 2.0 / square_of(e), k)
 
 
 @compiled
@@ -257,8 +249,7 @@ def put_resistance(c: int, key: int, s: StepArrays) -> None:
     s.key[d], s.kind[d], s.under[d] = key + s.key[c], ALONE, c
     s.gap[d] = s.mu[d] = s.e[d] = s.bias[d, 0] = s.bias[d, 1] = s.bias[d, 2] = 0.0
     s.collides[d] = 0
-    for k in range(36):
-        s.J[d, k] = 0.0
+    zero(s.J[d])
 
 
 @compiled
@@ -299,11 +290,10 @@ def evaluate_rows(t: float, y: Floats, s: StepArrays, system: System, loops: Any
         first = s.declared_mode[k]
         system.states[first] = STEPPED
         for i in range(3):
-            system.states[first + NEAREST + i] = 0.0
+            system.states[first + NEAR + i] = 0.0
     if s.declared_gap.size > 0:
         residual = system.residual
-        for k in range(residual.size):
-            residual[k] = 0.0
+        zero(residual)
         call_kinds(POSITION, POSITION, t, system, loops, residual, residual, residual)
     call_kinds(ACCELERATION, ACCELERATION, t, system, loops, system.D, system.gamma, system.nu)
     for q in range(s.row_place.size):

@@ -11,10 +11,10 @@ import math
 from typing import Any
 
 from dap3d_core.assembly.arrays import System, coordinate_offset, velocity_offset
+from dap3d_core.assembly.evaluate import copy, zero
 from dap3d_core.integrators.moreau.arrays import StepArrays
 from dap3d_core.integrators.moreau.contact_set import axes_of, evaluate_rows
 from dap3d_core.integrators.stepping.integration_state import TRIAL, Function, Y
-from dap3d_core.integrators.stepping.vector_ops import copy
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -37,11 +37,9 @@ def move_freely(
     copy(free, y)
     h = s.h / parts
     n = s.mass.size - 1
-    for k in range(s.y_free.size):
-        s.y_free[k] = 0.0
+    zero(s.y_free)
     for b in range(1, n + 1):
-        for i in range(6):
-            s.path[b, i] = 0.0
+        zero(s.path[b])
     for k in range(parts):
         begun = t + k * h
         if k > 0 or not has_rates:
@@ -80,8 +78,7 @@ def follow_states(work: Any, s: StepArrays, rhs: Function, system: System, loops
     y, trial, size, n = work.state[Y], work.state[TRIAL], work.state.shape[1], s.mass.size - 1
     slope, middle, parts = s.slopes[:size], s.slopes[size:], parts_of(work, s)
     first = s.first_state - 1
-    for i in range(first, size - 1):
-        trial[i] = y[i]
+    copy(trial[first : size - 1], y[first : size - 1])
     for k in range(2 * parts):  # to the middle of each part, and to its end
         place = (2 * (k // 2) + 1) / (2.0 * parts) if k % 2 else (k // 2) / parts
         for i in range(size):

@@ -9,6 +9,7 @@ no way from far away: sweeps that count in what joints answer with have one.
 
 import math
 
+from dap3d_core.assembly.evaluate import copy
 from dap3d_core.integrators.moreau.arrays import CONE, WHOLE
 from dap3d_core.integrators.moreau.newton import TINY
 from dap3d_core.kernels.array_types import Floats, Integers
@@ -133,7 +134,5 @@ def change_of(
 def copy_impulses(x: Floats, y: Floats, to_x: Floats, to_y: Floats, count: int) -> None:
     """Copy the impulses of so many contacts, and of joints."""
     for c in range(count):
-        for k in range(3):
-            to_x[c, k] = x[c, k]
-    for k in range(y.size):
-        to_y[k] = y[k]
+        copy(to_x[c], x[c])
+    copy(to_y, y)

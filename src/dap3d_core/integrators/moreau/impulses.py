@@ -6,10 +6,10 @@
 import math
 from typing import Any
 
-from dap3d_core.integrators.moreau.arrays import CONE, MET, WHOLE, StepArrays
+from dap3d_core.assembly.evaluate import copy
+from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import DECLARED, velocity_of
 from dap3d_core.integrators.moreau.newton import bound_of
-from dap3d_core.integrators.stepping.vector_ops import copy
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -194,6 +194,5 @@ def log_contacts(work: Any, s: StepArrays, t: float) -> None:
     for m in range(s.met_count):
         log, met = s.log[s.log_count], s.met[m]
         log[0] = t
-        for k in range(1, MET):
-            log[k] = met[k]
+        copy(log[1:], met[1:])
         s.log_count += 1

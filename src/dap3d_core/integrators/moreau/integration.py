@@ -20,11 +20,10 @@ import numpy as np
 
 from dap3d_core.formulations.contacts.contact_table import words_of_drive
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
-from dap3d_core.integrators.moreau.arrays import all_room, grown
+from dap3d_core.integrators.moreau.arrays import all_room, grown, step_arrays
 from dap3d_core.integrators.moreau.contact_set import POINTS
 from dap3d_core.integrators.moreau.free_motion import MOST_PARTS, PART
 from dap3d_core.integrators.moreau.impulses import log_contacts, put_means
-from dap3d_core.integrators.moreau.problem import arrays_of
 from dap3d_core.integrators.moreau.step import FOLLOWED, MOST_STEPS, START_ALONE, advance
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration import Integration
@@ -78,7 +77,7 @@ class MoreauIntegration(Integration):
         options.pop("stop_when_stiff", None)
         functions = evaluator.functions, evaluator.system, evaluator.loops
         super().__init__(*functions, y0, times, **options)
-        self._arrays = arrays_of(evaluator, self.work.state.shape[1], len(self.work.memory))
+        self._arrays = step_arrays(evaluator, self.work.state.shape[1], len(self.work.memory))
         self._contact_rows: list[Floats] = [Integration.contact_rows]
 
     def own_arrays(self, size: int, length_count: int) -> dict[str, Any]:

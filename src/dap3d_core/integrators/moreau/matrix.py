@@ -8,6 +8,7 @@ Elimination is in one thread, and in the same order everywhere.
 
 import math
 
+from dap3d_core.assembly.evaluate import copy, zero
 from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import DECLARED
 from dap3d_core.kernels.array_types import Floats, Integers
@@ -174,8 +175,7 @@ def assemble(s: StepArrays, weight: float, feels: float) -> None:
     feels: as of ``try_pass``.
     """
     K = s.K
-    for k in range(s.matrix_size):
-        K[k] = 0.0
+    zero(K[: s.matrix_size])
     for q in range(s.used_count):
         spin, m = s.spin[s.used[q]], s.mass[s.used[q]]
         start = block_at(s, q, q)
@@ -380,8 +380,7 @@ def solve_blocks(
         own = x[6 * a :]
         for e in range(start[a], start[a + 1]):
             take_from(K[36 * (n + 2 * e + 1) :], x[6 * entries[e] :], own)
-        for i in range(6):
-            scratch[i] = own[i]
+        copy(scratch[:6], own[:6])
         for i in range(6):
             total = 0.0
             for k in range(6):

@@ -16,6 +16,7 @@ not get over: they are taken back where rounds no longer help, and raised again 
 
 import math
 
+from dap3d_core.assembly.evaluate import copy
 from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import DECLARED, put_speeds, velocity_of
 from dap3d_core.integrators.moreau.matrix import (
@@ -32,8 +33,6 @@ PASSES, CUTS = 40, 8
 #: The best to which a round is solved.
 SOLUTION_ROUNDING = 1e-15
 TINY = 1e-300
-#: Unknowns up to which the matrix of a pass is a square; that of more has blocks.
-SMALL = 60
 
 
 @compiled
@@ -122,8 +121,7 @@ def put_velocities(s: StepArrays, v: Floats) -> None:
     """Put the velocities of a group with impulses x and y."""
     for q in range(s.used_count):
         b = s.used[q]
-        for k in range(6):
-            v[b, k] = s.free[b, k]
+        copy(v[b], s.free[b])
     for q in range(s.chosen_count):
         c = s.chosen[q]
         first, second, moved = v[s.bodies[c, 0]], v[s.bodies[c, 1]], s.moved[c]
@@ -135,8 +133,10 @@ def put_velocities(s: StepArrays, v: Floats) -> None:
         clear(s, s.rest)
         add_pull(s, s.y, s.rest)
         for q in range(s.used_count):
-            b = s.used[q]
-            add_inverse(s, b, s.rest[b], v[b])
+            b, change = s.used[q], s.turned
+            times_inverse(s, b, s.rest[b], change)
+            for k in range(6):
+                v[b, k] += change[k]
 
 
 @compiled
@@ -166,15 +166,6 @@ def times_inverse(s: StepArrays, b: int, x: Floats, out: Floats) -> None:
     for k in range(3):
         out[k] = m * x[k]
         out[3 + k] = spin[3 * k] * x[3] + spin[3 * k + 1] * x[4] + spin[3 * k + 2] * x[5]
-
-
-@compiled
-def add_inverse(s: StepArrays, b: int, x: Floats, out: Floats) -> None:
-    """Add M^-1 x of body b."""
-    spin, m = s.spin_inverse[b], s.mass_inverse[b]
-    for k in range(3):
-        out[k] += m * x[k]
-        out[3 + k] += spin[3 * k] * x[3] + spin[3 * k + 1] * x[4] + spin[3 * k + 2] * x[5]
 
 
 @compiled
@@ -229,9 +220,7 @@ def residual_of(s: StepArrays, v: Floats, left: float) -> float:
 @compiled
 def begin_round(s: StepArrays) -> None:
     """Take the velocities v as those that a round counts its changes from."""
-    for q in range(s.used_count):
-        for k in range(6):
-            s.delta[s.used[q], k] = 0.0
+    clear(s, s.delta)
     for q in range(s.chosen_count):
         put_speeds(s, s.chosen[q], s.v)
     for q in range(s.row_count):

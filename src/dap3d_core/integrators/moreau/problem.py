@@ -7,8 +7,8 @@ one does, and each is solved as if it were alone.
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
-from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.integrators.moreau.arrays import CONE, StepArrays, step_arrays
+from dap3d_core.assembly.evaluate import copy
+from dap3d_core.integrators.moreau.arrays import CONE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import put_inertia, put_speeds
 from dap3d_core.integrators.moreau.gauss_seidel import (
     copy_impulses,
@@ -17,7 +17,6 @@ from dap3d_core.integrators.moreau.gauss_seidel import (
 )
 from dap3d_core.integrators.moreau.matrix import lay_out
 from dap3d_core.integrators.moreau.newton import (
-    SMALL,
     TINY,
     impulse_of,
     left_at,
@@ -31,12 +30,10 @@ from dap3d_core.integrators.moreau.reduced import (
     LEAST,
     LESS,
     factor_joints,
-    is_small,
     meet_joints,
     put_felt,
     reduced_round,
 )
-from dap3d_core.integrators.stepping.vector_ops import copy
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -70,11 +67,6 @@ SETTLED = 2e-14
 HELD_ROUNDS, ANSWERED, MET, HELD = 3, 2, 3, 1e-12
 #: Residual above which rows of light bodies are taken as those of what these carry.
 CARRIED = 1e-12
-
-
-def arrays_of(evaluator: Evaluator, size: int, remembered: int) -> StepArrays:
-    """The arrays of a model; arguments as of ``step_arrays``."""
-    return step_arrays(evaluator, size, remembered, SMALL)
 
 
 @compiled
@@ -187,7 +179,7 @@ def solve_group(s: StepArrays, tolerance: float) -> bool:
     if few or joined:
         aim = RESIDUAL_ROUNDING if few and tolerance < NEAR else tolerance
         s.residual = 1e300
-        if is_small(s):
+        if joined and 3 * s.chosen_count <= s.small_step.size:  # few beside joints: alone
             if not factor_joints(s):
                 return False
             s.residual = newton(s, aim, True)

@@ -11,6 +11,7 @@ three unknowns a contact.
 
 import math
 
+from dap3d_core.assembly.evaluate import copy, zero
 from dap3d_core.integrators.moreau.arrays import ALONE, CONE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import put_speeds
 from dap3d_core.integrators.moreau.impulses import STICKS, mode_of
@@ -43,12 +44,6 @@ STIFF = 1e7
 PASSES, FOUND = 10, 1e-4
 #: How weights are taken back, at most.
 LESS, LEAST = 1e-2, 1.0
-
-
-@compiled
-def is_small(s: StepArrays) -> bool:
-    """True of so few contacts beside joints that their problem is solved alone."""
-    return s.row_count > 0 and 3 * s.chosen_count <= s.small_step.size
 
 
 @compiled
@@ -132,8 +127,7 @@ def solve_bodies(s: StepArrays) -> None:
         for k in range(6):
             s.change[6 * q + k] = s.delta[s.used[q], k]
     solve_factored(s)
-    for k in range(6):
-        s.delta[0, k] = 0.0
+    zero(s.delta[0])
     for q in range(s.used_count):
         for k in range(6):
             s.delta[s.used[q], k] = s.change[6 * q + k]
@@ -304,8 +298,7 @@ def try_reduced(s: StepArrays, weight: float, merit: float, feels: float, holds:
         if found < (1.0 - 0.1 * part) * merit:
             for q in range(m):
                 c = s.chosen[q]
-                for k in range(3):
-                    s.push[c, k] = s.kept[c, k]
+                copy(s.push[c], s.kept[c])
             return found
         part *= 0.5
     return -1.0

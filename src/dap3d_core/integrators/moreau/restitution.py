@@ -11,6 +11,7 @@ convex, and without a bounce nothing is gained.
 import math
 from typing import Any
 
+from dap3d_core.assembly.evaluate import copy
 from dap3d_core.integrators.moreau.arrays import BOUNCES, CONE, STOPS, StepArrays
 from dap3d_core.integrators.moreau.contact_set import velocity_of
 from dap3d_core.integrators.moreau.gauss_seidel import copy_impulses
@@ -23,7 +24,6 @@ from dap3d_core.integrators.moreau.problem import (
     root_of,
     solve,
 )
-from dap3d_core.integrators.stepping.vector_ops import copy
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
 

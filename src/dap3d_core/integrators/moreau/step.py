@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 from dap3d_core.assembly.arrays import System, coordinate_offset
+from dap3d_core.assembly.evaluate import copy, zero
 from dap3d_core.integrators.moreau.arrays import CONE, STAYS, WHOLE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import (
     evaluate_rows,
@@ -53,7 +54,7 @@ from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration_state import Function
 from dap3d_core.integrators.stepping.output import may_step, project_state
 from dap3d_core.integrators.stepping.step_control import count_turns, end_of_step
-from dap3d_core.integrators.stepping.vector_ops import all_finite, copy
+from dap3d_core.integrators.stepping.vector_ops import all_finite
 from dap3d_core.interface.contacts.rows import FAR_APART
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
@@ -140,8 +141,7 @@ def fly(work: Any, s: StepArrays, rhs: Function, system: System, loops: Any) -> 
     if work.step_count == 0:
         work.rate = work.last_rate = 0.0
         for array in (work.direction, work.pulls):
-            for k in range(array.size):
-                array[k] = 0.0
+            zero(array)
         forget(work.memory, 0)
     renews = work.step_count % RENEWED == 0
     if renews:
@@ -443,8 +443,7 @@ def part(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
             evaluate_rows(s.t1, trial, s, system, loops)
         prepare_problem(s)
         for b in range(s.free.shape[0]):
-            for k in range(6):
-                s.free[b, k] = 0.0
+            zero(s.free[b])
         for c in range(s.contact_count):
             s.bias[c, 0], s.mu[c] = s.gap[c], 0.0
             s.x[c, 0] = s.x[c, 1] = s.x[c, 2] = s.bias[c, 1] = s.bias[c, 2] = 0.0

@@ -13,7 +13,8 @@ held to (integration.py).
 """
 
 from dap3d_core.assembly.arrays import VALUE, Floats, states_offset, velocity_offset
-from dap3d_core.assembly.evaluate import call_kinds, place_state, rates, zero
+from dap3d_core.assembly.evaluate import call_kinds, copy, place_state, rates, zero
+from dap3d_core.assembly.metric import scaled
 from dap3d_core.formulations.common.constraints import (
     PART,
     acceleration_residual,
@@ -57,8 +58,7 @@ def find_slope(t: float, h: float, work: RadauState, given: Given) -> float:
         zero(system.change)
     rates(y, metric, system.change, out)
     last = y.shape[0] - 1
-    for k in range(states_offset(n), last):
-        out[k] = 0.0
+    zero(out[states_offset(n) : last])
     for k in range(velocity_offset(1, n), last):
         out[k] += end_rate(inverse, h, work, k)
     out[last] = work.F[work.stages - 1, last]
@@ -85,10 +85,8 @@ def scale_slopes(inverse: Floats, h: float, work: RadauState, metric: Floats,
             force[o + c] = end_rate(inverse, h, work, f + c)
         for c in range(3):
             force[o + c] /= k[0]
-        z2 = force[o + 5] / k[6]
-        z1 = (force[o + 4] - k[5] * z2) / k[4]
-        force[o + 3] = (force[o + 3] - k[2] * z1 - k[3] * z2) / k[1]
-        force[o + 4], force[o + 5] = z1, z2
+        turn = scaled(k, force[o + 3], force[o + 4], force[o + 5])
+        force[o + 3], force[o + 4], force[o + 5] = turn
 
 
 @compiled
@@ -170,8 +168,7 @@ def of_three_ends(h: float, work: RadauState) -> None:
 def dense_state(work: RadauState, t: float, y: Floats) -> None:
     """The state at an instant of the last step, by Newton's form of its dense output."""
     terms, nodes, theta = work.terms, work.nodes, (t - work.t_dense) / work.h_dense
-    for i in range(y.shape[0]):
-        y[i] = terms[work.dense_degree, i]
+    copy(y, terms[work.dense_degree])
     for row in range(work.dense_degree - 1, -1, -1):
         factor = theta - nodes[row]
         for i in range(y.shape[0]):

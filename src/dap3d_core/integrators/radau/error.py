@@ -5,13 +5,13 @@ Source: as of newton.py.
 
 from typing import Any
 
-from dap3d_core.assembly.arrays import Floats
 from dap3d_core.assembly.evaluate import zero
-from dap3d_core.formulations.stabilized_index2.stage_equations import (
-    evaluate_stage,
-    keep_frames,
+from dap3d_core.integrators.radau.newton import (
+    evaluate_bodies,
+    evaluate_stages,
+    method_index,
+    solve_first,
 )
-from dap3d_core.integrators.radau.newton import evaluate_stages, method_index, solve_first
 from dap3d_core.integrators.radau.state import Given, RadauState
 from dap3d_core.integrators.stepping.integration_state import NOISE, SCRATCH, TRIAL, Function, Y
 from dap3d_core.integrators.stepping.rounding import (
@@ -34,18 +34,7 @@ def estimate_error(t: float, h: float, work: RadauState, given: Given) -> float:
     away only as far as its own D is that of the state.
     """
     zero(work.last_multipliers[work.last_stages - 1, 0])
-    return filter_error(t, h, work, given, evaluate_first, solve_first)
-
-
-@compiled
-def evaluate_first(t: float, y: Floats, work: RadauState, given: Given) -> None:
-    """Rates at a state with the last multipliers into R[0]; G[0] is zero."""
-    system, loops, _tangent, matrix = given
-    evaluate_stage(t, y, work.last_multipliers[work.last_stages - 1], matrix.held, work.R[0],
-                   work.G[0], system, loops)  # fmt: skip
-    keep_frames(system.body, work.frames[0])
-    for r in range(2):
-        zero(work.G[0, r])
+    return filter_error(t, h, work, given, evaluate_bodies, solve_first)
 
 
 @compiled_into
@@ -54,15 +43,18 @@ def filter_error(
 ) -> float:
     """Norm of the error estimate (HW IV.8, (8.19), (8.20)); 1 is just good enough.
 
-    evaluate, solve: ``evaluate_first``, ``solve_first``, or those of other coordinates.
+    evaluate, solve: ``evaluate_bodies``, ``solve_first``, or those of other coordinates.
     """
+    last = work.last_multipliers[work.last_stages - 1]
     again = work.has_last_step == 0 or work.last_rejected != 0
     y, argument, e = work.state[Y], work.state[SCRATCH], work.method.e[method_index(work.stages)]
     error = 0.0
     for attempt in range(2 if again else 1):
         for k in range(y.shape[0]):
             argument[k] = y[k] + (work.R[0, k] if attempt == 1 else 0.0)
-        evaluate(t, argument, work, given)
+        evaluate(t, argument, last, 0, work.R[0], work, given)
+        for r in range(2):
+            zero(work.G[0, r])
         work.rhs_count += 1
         for i in range(work.stages):
             for k in range(y.shape[0]):
@@ -82,7 +74,7 @@ def find_work(t: float, h: float, work: RadauState, given: Given) -> float:
     The iteration leaves the rates of stages at their last but one values. No error control sees the
     work, so its powers are evaluated once more, at the stages as found.
     """
-    evaluate_stages(t, h, work, given)
+    evaluate_stages(t, h, work, given, evaluate_bodies)
     sum_work(h, work)
     return 0.0
 
@@ -100,8 +92,18 @@ def sum_work(h: float, work: RadauState) -> None:
 
 @compiled
 def measure_stage_noise(t: float, h: float, work: RadauState, given: Given) -> float:
-    """Uncertainty of dy/dt at (t, y) in a step h, the factors of which are known."""
-    system, loops, _tangent, matrix = given
+    """``measure_noise`` on the equations of bodies."""
+    return measure_noise(t, h, work, given, evaluate_bodies, solve_first)
+
+
+@compiled_into
+def measure_noise(
+    t: float, h: float, work: RadauState, given: Given, evaluate: Any, solve: Any
+) -> float:
+    """Uncertainty of dy/dt at (t, y) in a step h, the factors of which are known.
+
+    evaluate, solve: as of ``filter_error``.
+    """
     y, argument, noise = work.state[Y], work.state[SCRATCH], work.tolerance[NOISE]
     now, changed = work.last_multipliers[work.last_stages - 1], work.multipliers[0]
     e, size = work.method.e[method_index(work.stages)], 0.0
@@ -111,18 +113,17 @@ def measure_stage_noise(t: float, h: float, work: RadauState, given: Given) -> f
     zero(now[0])
     zero(changed[0])
     work.rhs_count += SAMPLES + 1
-    evaluate_stage(t, y, now, matrix.held, work.R[1], work.G[1], system, loops)
+    evaluate(t, y, now, 1, work.R[1], work, given)
     for sample in range(SAMPLES):
         change_digits(y, sample, argument)
         change_digits(now[1], sample, changed[1])
-        evaluate_stage(t, argument, changed, matrix.held, work.R[0], work.G[0], system, loops)
-        keep_frames(system.body, work.frames[0])
+        evaluate(t, argument, changed, 0, work.R[0], work, given)
         for k in range(y.shape[0]):
             work.R[0, k] -= work.R[1, k]
         for r in range(2):
             for k in range(work.G.shape[2]):
                 work.G[0, r, k] -= work.G[1, r, k]
-        solve_first(h, work, given)
+        solve(h, work, given)
         for k in range(y.shape[0]):
             noise[k] = max(noise[k], size * abs(work.R[0, k]))
     return 0.0

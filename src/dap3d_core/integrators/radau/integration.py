@@ -13,7 +13,6 @@ from dap3d_core.formulations.stabilized_index2.jacobian import BODY, FIRST_ROW, 
 from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
 from dap3d_core.formulations.stabilized_index2.state_tangent import (
     OF_LOOPS,
-    coupled_bodies,
     make_tangent,
 )
 from dap3d_core.integrators.radau import state as at
@@ -60,34 +59,37 @@ def make_matrix(evaluator: Evaluator, tangent: Any) -> tuple[StageMatrix, LuPlan
     reading = [_node_of(row[FIRST_ROW], starts, nodes) for row in readings]
     read = [(k, row[BODY]) for k, row in zip(reading, readings, strict=True) if row[BODY]]
     states = _state_nodes(model, nodes)
-    lu = make_lu_plan(n, nodes, coupled_bodies(tangent), states, read)
+    blocks = tangent.blocks.tolist()
+    coupled = [(a, b) for _, a, b in blocks if a != b]
+    lu = make_lu_plan(n, nodes, coupled, states, read)
     of_row = {}
     joints = []
     for k, node in enumerate(nodes):
         first = starts[k]
         of_row[first] = k
-        joints.append((lu.joint_block(k), node.rows, first))
+        joints.append((lu.place[k, k], node.rows, first))
     places = []
     for _, b, _, first, _ in plan.blocks.tolist():
-        k = of_row[first]
-        places.append((*lu.joint_blocks(k, b), int(lu.joint_first[k])))
+        k, body = of_row[first], lu.body(b)
+        places.append((lu.place[k, body], lu.place[body, k], int(lu.joint_first[k])))
     state_nodes, state_places = _state_tables(evaluator, states, lu)
     held = np.zeros(plan.row_size, dtype=np.int64)
     held[evaluator.system.row] = model.position_row
-    blocks = tangent.blocks.tolist()
     matrix = StageMatrix(
         nodes=lu.nodes,
         columns=lu.columns,
         updates=lu.updates,
         body_first=lu.body_first,
-        body_place=np.array([0, *(lu.body_block(b, b) for b in range(1, n + 1))], dtype=np.int64),
-        pair_place=np.array([lu.body_block(a, b) for _, a, b in blocks], dtype=np.int64),
+        body_place=np.array(
+            [0, *(lu.place[b, b] for b in map(lu.body, range(1, n + 1)))], np.int64
+        ),
+        pair_place=np.array([lu.place[lu.body(a), lu.body(b)] for _, a, b in blocks], np.int64),
         block_place=np.array(places, dtype=np.int64).reshape(-1, 3),
         joint_place=np.array(joints, dtype=np.int64).reshape(-1, 3),
         read_place=np.array(
             [
                 (
-                    lu.joint_blocks(k, row[BODY])[1] if row[BODY] else -1,
+                    lu.place[lu.body(row[BODY]), k] if row[BODY] else -1,
                     nodes[k].rows,
                     row[FIRST_ROW] - starts[k],
                 )
@@ -132,15 +134,19 @@ def _state_tables(
     rows, places, first = [], [], 0
     widest = max((len(node.bodies) for node in states), default=0)
     for e, node in enumerate(states):
-        row = [first, int(lu.element_first[e]), lu.element_block(e), 0, 0, 0, 0, node.size]
+        own_node = lu.element(e)
+        diagonal = lu.place[own_node, own_node]
+        row = [first, int(lu.element_first[e]), diagonal, 0, 0, 0, 0, node.size]
         if node.joint >= 0:
             of_node = plan.ordering.nodes[node.joint]
             own = int(plan.joint_row[next(joint)])
             shift = own - int(plan.joint_row[of_node.joints[0]])
-            row[3:7] = lu.joint_element_block(node.joint, e), of_node.rows, shift, own
+            row[3:7] = lu.place[node.joint, own_node], of_node.rows, shift, own
         rows.append(row)
-        blocks = [lu.element_blocks(e, b) if b else (-1, -1) for b in node.bodies]
-        flat = [place for pair in blocks for place in pair]
+        flat = []
+        for b in node.bodies:
+            body = lu.body(b)
+            flat += [lu.place[own_node, body], lu.place[body, own_node]] if b else [-1, -1]
         places.append(flat + [-1] * (2 * widest - len(flat)))
         first += node.size
     return (

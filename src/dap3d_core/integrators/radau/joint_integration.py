@@ -15,26 +15,24 @@ import attrs
 import numpy as np
 
 from dap3d_core.assembly.arrays import LENGTH, STEP, Floats, System
-from dap3d_core.assembly.evaluate import zero
+from dap3d_core.assembly.evaluate import copy
 from dap3d_core.formulations.stabilized_index2.jacobian import BENT, MAY_BEND
 from dap3d_core.integrators.radau.convergence import size_of_change
-from dap3d_core.integrators.radau.error import filter_error, sum_work
+from dap3d_core.integrators.radau.error import filter_error, measure_noise, sum_work
 from dap3d_core.integrators.radau.integration import RadauIntegration
 from dap3d_core.integrators.radau.newton import (
-    UNFOUND,
+    evaluate_stages,
+    factorise,
     find_slopes,
     iterate_stages,
     method_index,
     pair_count,
-    pole,
     separate,
-    subtract_slope,
     unite,
 )
 from dap3d_core.integrators.radau.state import TRIAL_SLOPE, Given, RadauState
 from dap3d_core.integrators.stepping.integration import Integration
-from dap3d_core.integrators.stepping.integration_state import NOISE, OTHER, SCRATCH, TRIAL, Y
-from dap3d_core.integrators.stepping.rounding import ROUNDINGS, SAMPLES, change_digits
+from dap3d_core.integrators.stepping.integration_state import OTHER, SCRATCH, TRIAL, Y
 from dap3d_core.kernels.compiler.types import Table
 from dap3d_core.kernels.runtime.array_struct import (
     Arrays,
@@ -43,7 +41,7 @@ from dap3d_core.kernels.runtime.array_struct import (
 )
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.kernels.scalar_math import is_differentiated
-from dap3d_core.linear.lu import StateNode, factor_lu, make_lu_plan, solve_lu
+from dap3d_core.linear.lu import StateNode, make_lu_plan, solve_lu
 
 #: Step of a difference, as part of a component's size: short against the depth of stiff contact
 #: and against v_tol of friction, whose bends it must not reach over.
@@ -139,9 +137,9 @@ def slopes(
 
 
 @compiled
-def fill_dense(s: Any, K: Any, J: Floats) -> None:
+def fill_dense(s: Any, K: Any, given: Given) -> None:
     """K = s - J, for real or complex s in 1/s."""
-    n = J.shape[0]
+    J, n = given[2].J, given[2].J.shape[0]
     for i in range(n):
         for j in range(n):
             K[n * i + j] = -J[i, j]
@@ -151,34 +149,17 @@ def fill_dense(s: Any, K: Any, J: Floats) -> None:
 @compiled
 def factorise_rates(t: float, h: float, work: RadauState, given: Given) -> float:
     """As ``factorise_both``."""
-    tangent = given[2]
-    poles = work.method.poles[method_index(work.stages)]
-    nodes, columns, updates = tangent.nodes, tangent.columns, tangent.updates
-    work.factorisation_count += 1
-    work.factored_step = h
-    fill_dense(poles[0] / h, work.K, tangent.J)
-    regular = factor_lu(nodes, columns, updates, work.K, work.pivots)
-    for p in range(pair_count(work.stages) if regular else 0):
-        fill_dense(pole(poles, p, h), work.Kc[p], tangent.J)
-        regular = regular and factor_lu(nodes, columns, updates, work.Kc[p], work.pivotsc[p])
-    if regular:
-        return 0.0
-    work.factored_step = 0.0
-    return UNFOUND
+    return factorise(h, work, given, given[2], fill_dense)
 
 
 @compiled
-def evaluate_rates(t: float, h: float, work: RadauState, given: Given) -> None:
-    """Residuals F - A^-1 Z / h of the stages into R."""
+def evaluate_rate(
+    t: float, y: Floats, multipliers: Floats, i: int, out: Floats, work: RadauState, given: Given
+) -> None:
+    """As ``evaluate_bodies``; there are no multipliers."""
     system, loops, _tangent, functions = given
-    rhs, y, argument = functions[0], work.state[Y], work.state[SCRATCH]
-    m = method_index(work.stages)
-    for i in range(work.stages):
-        for k in range(y.shape[0]):
-            argument[k] = y[k] + work.Z[i, k]
-        rhs(t + work.method.c[m, i] * h, argument, work.F[i], system, loops)
-        subtract_slope(i, h, work.method.inverse[m], work)
-    work.rhs_count += work.stages
+    rhs = functions[0]
+    rhs(t, y, out, system, loops)
 
 
 @compiled
@@ -211,18 +192,10 @@ def change_rates(h: float, work: RadauState, system: System) -> float:
 @compiled
 def find_rate_stages(t: float, h: float, work: RadauState, given: Given) -> float:
     """As ``find_stages``."""
-    shorter = iterate_stages(t, h, work, given, evaluate_rates, solve_rates, change_rates)
+    shorter = iterate_stages(t, h, work, given, evaluate_rate, solve_rates, change_rates)
     if shorter == 0.0 and is_differentiated():
-        find_slopes(t, h, work, given, evaluate_rates, solve_rates)
+        find_slopes(t, h, work, given, evaluate_rate, solve_rates)
     return shorter
-
-
-@compiled
-def evaluate_rate(t: float, y: Floats, work: RadauState, given: Given) -> None:
-    """Rates at a state into R[0]."""
-    system, loops, _tangent, functions = given
-    rhs = functions[0]
-    rhs(t, y, work.R[0], system, loops)
 
 
 @compiled
@@ -230,11 +203,9 @@ def solve_rate(h: float, work: RadauState, given: Given) -> None:
     """R[0] from a residual to the change, with the real matrix."""
     tangent = given[2]
     x, residual = work.xr, work.R[0]
-    for k in range(x.shape[0]):
-        x[k] = residual[k]
+    copy(x, residual)
     solve_lu(tangent.nodes, tangent.columns, work.K, work.pivots, x)
-    for k in range(x.shape[0]):
-        residual[k] = x[k]
+    copy(residual[: x.size], x)
     residual[residual.shape[0] - 1] = 0.0
 
 
@@ -257,30 +228,13 @@ def find_rate_slope(t: float, h: float, work: RadauState, given: Given) -> float
 @compiled
 def measure_rate_noise(t: float, h: float, work: RadauState, given: Given) -> float:
     """As ``measure_stage_noise``."""
-    system, loops, _tangent, functions = given
-    rhs, y, argument = functions[0], work.state[Y], work.state[SCRATCH]
-    noise = work.tolerance[NOISE]
-    m, size = method_index(work.stages), 0.0
-    for i in range(work.stages):
-        size += ROUNDINGS * abs(work.method.e[m, i]) / h
-    zero(noise)
-    work.rhs_count += SAMPLES + 1
-    rhs(t, y, work.R[1], system, loops)
-    for sample in range(SAMPLES):
-        change_digits(y, sample, argument)
-        rhs(t, argument, work.R[0], system, loops)
-        for k in range(y.shape[0]):
-            work.R[0, k] -= work.R[1, k]
-        solve_rate(h, work, given)
-        for k in range(y.shape[0]):
-            noise[k] = max(noise[k], size * abs(work.R[0, k]))
-    return 0.0
+    return measure_noise(t, h, work, given, evaluate_rate, solve_rate)
 
 
 @compiled
 def find_rate_work(t: float, h: float, work: RadauState, given: Given) -> float:
     """As ``find_work``."""
-    evaluate_rates(t, h, work, given)
+    evaluate_stages(t, h, work, given, evaluate_rate)
     sum_work(h, work)
     return 0.0
 
@@ -320,8 +274,7 @@ class JointRadauIntegration(RadauIntegration):
         contacts = self.evaluator.system.contacts
         if not len(contacts):
             return count
-        from dap3d_core.formulations.contacts.equations import STATE
-        from dap3d_core.formulations.contacts.rows import OF_CONTACT
+        from dap3d_core.formulations.contacts.equations import OF_CONTACT, STATE
 
         of_contacts = np.add.outer(contacts[:, STATE], np.arange(OF_CONTACT))
         return int(np.max(np.setdiff1d(np.arange(count), of_contacts), initial=-1)) + 1

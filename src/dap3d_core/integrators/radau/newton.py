@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, System, velocity_offset
-from dap3d_core.assembly.evaluate import largest, place, zero
+from dap3d_core.assembly.evaluate import copy, largest, place, zero
 from dap3d_core.assembly.state_update import add_displacement, add_velocity
 from dap3d_core.formulations.common.constraints import linearise
 from dap3d_core.formulations.stabilized_index2.jacobian import BENT, differentiate
@@ -113,16 +113,31 @@ def pole(poles: Floats, p: int, h: float) -> Any:
 
 @compiled
 def factorise_both(t: float, h: float, work: RadauState, given: Given) -> float:
-    """Factors of the real and the complex systems of a step h; 0, or UNFOUND if one is singular."""
+    """``factorise`` on the equations of bodies."""
+    return factorise(h, work, given, given[3], fill_stages)
+
+
+@compiled
+def fill_stages(s: Any, K: Any, given: Given) -> None:
+    """K = s - J, for real or complex s in 1/s."""
     system, _loops, tangent, matrix = given
+    fill_matrix(s, K, system.blocks, matrix, tangent)
+
+
+@compiled_into
+def factorise(h: float, work: RadauState, given: Given, program: Any, fill: Any) -> float:
+    """Factors of the real and the complex systems of a step h; 0, or UNFOUND if one is singular.
+
+    program: of elimination, by its tables. fill: as ``fill_stages``.
+    """
     poles = work.method.poles[method_index(work.stages)]
+    nodes, columns, updates = program.nodes, program.columns, program.updates
     work.factorisation_count += 1
     work.factored_step = h
-    fill_matrix(poles[0] / h, work.K, system.blocks, matrix, tangent)
-    nodes, columns, updates = matrix.nodes, matrix.columns, matrix.updates
+    fill(poles[0] / h, work.K, given)
     regular = factor_lu(nodes, columns, updates, work.K, work.pivots)
     for p in range(pair_count(work.stages) if regular else 0):
-        fill_matrix(pole(poles, p, h), work.Kc[p], system.blocks, matrix, tangent)
+        fill(pole(poles, p, h), work.Kc[p], given)
         regular = regular and factor_lu(nodes, columns, updates, work.Kc[p], work.pivotsc[p])
     if regular:
         return 0.0
@@ -162,8 +177,7 @@ def predict(h: float, work: RadauState, prolong: bool, system: System) -> None:
         for r in range(2):
             zero(now[i, r])
         if work.has_last_step == 0 or not prolong or keeps:
-            for k in range(now.shape[2]):
-                now[i, 1, k] = last[before - 1, 1, k]
+            copy(now[i, 1], last[before - 1, 1])
         if work.has_last_step == 0 and prolong and keeps:
             for k in range(stages.shape[1]):
                 stages[i, k] = c[i] * h * work.state[SLOPE, k]
@@ -265,17 +279,27 @@ def subtract_slope(i: int, h: float, inverse: Floats, work: RadauState) -> None:
 
 
 @compiled
-def evaluate_stages(t: float, h: float, work: RadauState, given: Given) -> None:
-    """Residuals of the stages: F - A^-1 Z / h into R, those of the rows into G."""
+def evaluate_bodies(
+    t: float, y: Floats, multipliers: Floats, i: int, out: Floats, work: RadauState, given: Given
+) -> None:
+    """Rates at a state with multipliers (2, R) into out; G[i] and ``frames[i]`` there."""
     system, loops, _tangent, matrix = given
+    evaluate_stage(t, y, multipliers, matrix.held, out, work.G[i], system, loops)
+    keep_frames(system.body, work.frames[i])
+
+
+@compiled_into
+def evaluate_stages(t: float, h: float, work: RadauState, given: Given, evaluate: Any) -> None:
+    """Residuals of the stages: F - A^-1 Z / h into R, those of the rows into G.
+
+    evaluate: as ``evaluate_bodies``.
+    """
     y, argument, m = work.state[Y], work.state[SCRATCH], method_index(work.stages)
     stages, inverse, c = work.Z, work.method.inverse[m], work.method.c[m]
     for i in range(work.stages):
         for k in range(y.shape[0]):
             argument[k] = y[k] + stages[i, k]
-        evaluate_stage(t + c[i] * h, argument, work.multipliers[i], matrix.held, work.F[i],
-                       work.G[i], system, loops)  # fmt: skip
-        keep_frames(system.body, work.frames[i])
+        evaluate(t + c[i] * h, argument, work.multipliers[i], i, work.F[i], work, given)
         subtract_slope(i, h, inverse, work)
     work.rhs_count += work.stages
 
@@ -330,9 +354,9 @@ def most_iterations(stages: int) -> int:
 @compiled
 def find_stages(t: float, h: float, work: RadauState, given: Given) -> float:
     """``iterate_stages`` on the equations of bodies."""
-    shorter = iterate_stages(t, h, work, given, evaluate_stages, solve_stages, change_stages)
+    shorter = iterate_stages(t, h, work, given, evaluate_bodies, solve_stages, change_stages)
     if shorter == 0.0 and is_differentiated():
-        find_slopes(t, h, work, given, evaluate_stages, solve_stages)
+        find_slopes(t, h, work, given, evaluate_bodies, solve_stages)
     return shorter
 
 
@@ -349,7 +373,7 @@ def find_slopes(
     stages, moves, found, changes = work.Z, work.R, work.multipliers, work.G
     before = LARGEST
     for done in range(MOST_OF_SLOPES):
-        evaluate(t, h, work, given)
+        evaluate_stages(t, h, work, given, evaluate)
         solve(h, work, given)
         work.rhs_count -= work.stages
         change = change_of_slopes(work)
@@ -370,7 +394,7 @@ def iterate_stages(
 ) -> float:
     """Newton's iteration for the stages of a step h.
 
-    evaluate, solve, change_by: as ``evaluate_stages``, ``solve_stages``, ``change_stages``.
+    evaluate, solve, change_by: as ``evaluate_bodies``, ``solve_stages``, ``change_stages``.
 
     Returns:
         0 where they are found; else the factor on the step that is to be tried; NaN where a number
@@ -384,7 +408,7 @@ def iterate_stages(
     most = MOST_FIXED if fixed else most_iterations(work.stages)
     least = 2 if tangent.bends[0] == BENT else 1  # rates of other steps say nothing across a bend
     for done in range(1, most + 1):
-        evaluate(t, h, work, given)
+        evaluate_stages(t, h, work, given, evaluate)
         solve(h, work, given)
         change = change_by(h, work, given[0])
         work.iteration_count, work.last_iterations = work.iteration_count + 1, done

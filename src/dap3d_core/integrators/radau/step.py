@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from dap3d_core.assembly.arrays import System
+from dap3d_core.assembly.evaluate import copy
 from dap3d_core.formulations.stabilized_index2.jacobian import BENT, MAY_BEND, Tangent
 from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
 from dap3d_core.integrators.radau.convergence import is_at_rounding
@@ -112,8 +113,7 @@ def start(work: RadauState, rhs: Function, project: Function, system: System, lo
     work.last_stages = FEWEST
     for k in range(work.last_multipliers.shape[2]):
         work.last_multipliers[FEWEST - 1, 1, k] = -system.multipliers[k]
-    for k in range(y.shape[0]):
-        work.state[SLOPE, k] = work.k[0, k]
+    copy(work.state[SLOPE], work.k[0])
     work.first_stage_valid = work.tangent_needed = 1
     work.has_last_step = 0
     work.convergence_factor = 1.0
@@ -302,8 +302,7 @@ def accept(work: RadauState, t1: float, h: float, error: float) -> None:
             work.Z_old[i, k] = work.Z[i, k]
     for i in range(work.stages):
         for r in range(2):
-            for k in range(work.multipliers.shape[2]):
-                work.last_multipliers[i, r, k] = work.multipliers[i, r, k]
+            copy(work.last_multipliers[i, r], work.multipliers[i, r])
     work.last_stages = work.stages
     work.step_count += 1
     work.tangent_is_current = 0

@@ -117,7 +117,7 @@ def begin_stage(work: RungeKuttaState, lanes: Lanes, k: int) -> int:
     """
     if work.sampled_switch_count != 0:
         count_from_far_edges(work.switches, at.SAMPLE)
-        if is_cut_at_sample(work, lanes.t[k], lanes.length[k]):
+        if is_cut_at_sample(work, lanes.t[k], lanes.end[k] - work.t):
             lanes.does[k] = CUT
             return 0
     work.rhs_count += 1

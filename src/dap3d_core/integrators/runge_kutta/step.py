@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 
+from dap3d_core.assembly.evaluate import copy
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.runge_kutta.stiffness import detect_stiffness
 from dap3d_core.integrators.runge_kutta.sums import (
@@ -40,8 +41,8 @@ from dap3d_core.integrators.stepping.event_location import (
     update_switches_after_step,
 )
 from dap3d_core.integrators.stepping.integration_state import Function
-from dap3d_core.integrators.stepping.output import dense_state, may_step, needs_dense, project_state
-from dap3d_core.integrators.stepping.rounding import record_failure, update_rounding
+from dap3d_core.integrators.stepping.output import dense_state, needs_dense, project_state
+from dap3d_core.integrators.stepping.rounding import record_failure
 from dap3d_core.integrators.stepping.singular_poses import (
     is_approaching,
     is_at_singularity,
@@ -53,6 +54,7 @@ from dap3d_core.integrators.stepping.singular_poses import (
     update_measures,
 )
 from dap3d_core.integrators.stepping.step_control import (
+    FROM_START,
     LARGEST,
     SINGULAR_END_ATTEMPTS,
     SINGULAR_END_REACH,
@@ -60,8 +62,8 @@ from dap3d_core.integrators.stepping.step_control import (
     STEP_AFTER_SINGULAR_END,
     STEP_CUT,
     accept,
+    advance_by,
     combined_error,
-    count_turns,
     end_of_step,
     first_step,
     judge_turns,
@@ -71,7 +73,7 @@ from dap3d_core.integrators.stepping.step_control import (
     step_reduction,
 )
 from dap3d_core.integrators.stepping.switch_values import evaluate
-from dap3d_core.integrators.stepping.vector_ops import all_finite, copy, scaled_largest
+from dap3d_core.integrators.stepping.vector_ops import all_finite, scaled_largest
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.kernels.scalar_math import where, with_slopes
@@ -93,17 +95,7 @@ def advance(
 
     At least one step is tried in each call, whatever the budget.
     """
-    rhs, project, report = functions[0], functions[1], functions[2]
-    watch = functions[4] if work.switch_count != 0 else rhs
-    accepted = functions[3] if work.calls_accepted != 0 else rhs
-    limit = work.rhs_count + budget
-    while may_step(work, dense_state, limit, project, report, system, loops):
-        steps, rejected = work.step_count, work.rejected_count
-        h = work.h
-        step(work, (rhs, project, accepted, watch), system, loops)
-        update_rounding(work, work.k[0], h, rejected, rhs, system, loops)
-        if work.calls_accepted != 0 and work.step_count > steps:
-            count_turns(work, accepted, system, loops)
+    advance_by(step, dense_state, work, work.k[0], functions, system, loops, budget, FROM_START)
 
 
 @compiled
@@ -251,9 +243,7 @@ def take_stages(
 
     False where one of them lies beyond a switch, or at a singular state: then the step is cut.
     """
-    k, table = work.k, work.table
-    rhs, project, _, watch = functions
-    stages, watched = work.stage_count, work.switch_count != 0
+    stages, table, k = work.stage_count, work.table, work.k
     last = stages if work.error_uses_last_stage != 0 else stages - 1
     for i in range(1, stages + 1):
         x = work.state[at.TRIAL] if i == stages else work.state[at.SCRATCH]
@@ -261,15 +251,28 @@ def take_stages(
         if i <= last:
             c = table[i, ABSCISSA]
             t = t1 if c == 1.0 else work.t + c * h
-            if near:
-                project_stage(work, t, x, project, system, loops)
-                x = work.state[at.SCRATCH]
-                if cut_at_stage(work, t, t1):
-                    return False
-            if watched and is_sample_across(work, t, h, x, watch, system, loops):
+            if not evaluate_stage(work, i, t, x, t1, near, functions, system, loops):
                 return False
             work.rhs_count += 1
-            rhs(t, x, k[i], system, loops)
+    return True
+
+
+@compiled
+def evaluate_stage(
+    work: RungeKuttaState, i: int, t: float, x: Floats, t1: float, near: bool, functions: Any,
+    system: Any, loops: Any,
+) -> bool:  # fmt: skip
+    """Rates of stage i, at t and the state x, of a step to t1; False as for ``take_stages``."""
+    rhs, project, _, watch = functions
+    if near:
+        project_stage(work, t, x, project, system, loops)
+        x = work.state[at.SCRATCH]
+        if cut_at_stage(work, t, t1):
+            return False
+    length = t1 - work.t
+    if work.switch_count != 0 and is_sample_across(work, t, length, x, watch, system, loops):
+        return False
+    rhs(t, x, work.k[i], system, loops)
     return True
 
 
@@ -429,18 +432,11 @@ def take_dense_stages(
 ) -> bool:
     """The further stages that dense output needs; False as for ``take_stages``."""
     t, argument, table, k = work.t, work.state[at.SCRATCH], work.table, work.k
-    rhs, project, _, watch = functions
-    watched = work.switch_count != 0
     for i in range(work.stage_count + 1, k.shape[0]):
         instant = t + table[i, ABSCISSA] * (t1 - t)
         combine(argument, 1.0, work.state[at.Y], t1 - t, table, i, k)
-        if near:
-            project_stage(work, instant, argument, project, system, loops)
-            if cut_at_stage(work, instant, t1):
-                return False
-        if watched and is_sample_across(work, instant, t1 - t, argument, watch, system, loops):
+        if not evaluate_stage(work, i, instant, argument, t1, near, functions, system, loops):
             return False
-        rhs(instant, argument, k[i], system, loops)
     return True
 
 

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import ENDS, JUMPS, MODE_ENDS, UNSEEN
+from dap3d_core.assembly.evaluate import copy
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration_state import Function, IntegrationState
 from dap3d_core.integrators.stepping.output import project_state
@@ -333,8 +334,7 @@ def bisect_crossing(
         work.t_stop, work.status = t + high, failure
         return
     work.t = t + high
-    for i in range(slope.shape[0]):
-        work.state[at.Y, i] = work.state[at.TRIAL, i]
+    copy(work.state[at.Y], work.state[at.TRIAL])
     work.step_count += 1
     if work.fixed_step != 0.0 and work.t >= end:
         work.segment_step += 1
@@ -380,8 +380,7 @@ def differentiated_crossing(
     beside = with_slopes(rate_difference(work), 0.0)
     for _ in range(CROSSING_PASSES):
         euler_step(work, h + beside, slope, project, watch, system, loops)
-        for k in range(s.shape[1]):
-            s[at.FOUND_RATE, k] = s[at.FOUND, k]
+        copy(s[at.FOUND_RATE], s[at.FOUND])
         euler_step(work, h - beside, slope, project, watch, system, loops)
         for k in range(s.shape[1]):
             s[at.FOUND_RATE, k] = (s[at.FOUND_RATE, k] - s[at.FOUND, k]) / (2.0 * beside)

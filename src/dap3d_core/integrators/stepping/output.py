@@ -3,10 +3,11 @@
 from collections.abc import Callable
 from typing import Any
 
+from dap3d_core.assembly.evaluate import copy
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.break_points import next_stop, restart
 from dap3d_core.integrators.stepping.integration_state import Function
-from dap3d_core.integrators.stepping.vector_ops import all_finite, copy, interpolate
+from dap3d_core.integrators.stepping.vector_ops import all_finite, interpolate
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 

@@ -41,8 +41,12 @@ class Restorable:
         """
         new = {name: self.restored(name, a, found.get(name)) for name, a in self.all_arrays()}
         integers, reals = self.scalars(new, "integer"), self.scalars(new, "real")
-        check_integers(integers, self.allowed_integers(integers))
-        check_reals(reals, at.allowed_reals(self.work))
+        for key, values in self.allowed_integers(integers).items():
+            if integers[key] not in values:
+                raise ValueError(f"{key} is {integers[key]}, which no run can have there")
+        for key, (least, most) in at.allowed_reals(self.work).items():
+            if not least <= reals[key] <= most:
+                raise ValueError(f"{key} is {reals[key]:g}, which no run can have there")
         check_crossings(new["crossings"], integers["crossing_count"], self.work)
         if not np.isfinite(new["state"][at.Y]).all():
             raise ValueError("its state is not finite")
@@ -100,20 +104,6 @@ def restored(name: str, array: Any, found: Any, own: Iterable[Any] = ()) -> Any:
         raise ValueError(f"its scene gives another model here ({name})")
     new[places] = array[places]
     return new
-
-
-def check_integers(found: Mapping[str, int], allowed: Mapping[str, Container[int]]) -> None:
-    """ValueError for the first of the integers of a state that holds what it cannot."""
-    for name, values in allowed.items():
-        if found[name] not in values:
-            raise ValueError(f"{name} is {found[name]}, which no run can have there")
-
-
-def check_reals(found: Mapping[str, float], allowed: Mapping[str, tuple[float, float]]) -> None:
-    """ValueError for the first of the numbers of a state that holds what it cannot."""
-    for name, (least, most) in allowed.items():
-        if not least <= found[name] <= most:
-            raise ValueError(f"{name} is {found[name]:g}, which no run can have there")
 
 
 def check_crossings(crossings: Floats, count: int, work: Any) -> None:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dap3d_core.assembly.evaluate import zero
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration_state import Function
 from dap3d_core.kernels.array_types import Floats
@@ -83,8 +84,7 @@ def can_measure(work: Any, rejected: int) -> bool:
 def judge_noise(work: Any, h: float) -> None:
     """Bound what was measured in a step h; forget it where it is far below the tolerances."""
     y, tolerance, size = work.state[at.Y], work.tolerance, work.state[at.SCRATCH]
-    for i in range(y.size):
-        size[i] = 0.0
+    zero(size)
     for i in range(y.size):
         first = int(tolerance[at.KIND, i])
         size[first] = max(size[first], abs(y[i]))
@@ -129,8 +129,7 @@ def find_rate_noise(work: Any, noise: Floats, rhs: Function, system: Any, loops:
         work.state[at.TRIAL],
     )
     rhs(work.t, y, f, system, loops)
-    for i in range(y.size):
-        noise[i] = 0.0
+    zero(noise)
     for sample in range(SAMPLES):
         change_digits(y, sample, argument)
         rhs(work.t, argument, out, system, loops)

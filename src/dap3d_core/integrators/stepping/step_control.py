@@ -5,14 +5,17 @@ their codes DOPRI5 and DOP853.
 """
 
 import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
+from dap3d_core.assembly.evaluate import copy
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration_state import Function
-from dap3d_core.integrators.stepping.output import NEAR_SINGULAR
-from dap3d_core.integrators.stepping.vector_ops import copy, scaled_largest
+from dap3d_core.integrators.stepping.output import NEAR_SINGULAR, may_step
+from dap3d_core.integrators.stepping.rounding import update_rounding
+from dap3d_core.integrators.stepping.vector_ops import scaled_largest
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.scalar_math import with_slopes
 
 #: A step is never shorter than this part of the time or of the whole span, sixteen roundings.
@@ -37,6 +40,30 @@ FROM_START, FROM_END, OF_ERROR, OF_LENGTH = 1.0, 2.0, 0.0, -1.0
 WORK_SLACK, WORK_STEP = 100.0, 1e-3
 #: The last step is stretched by at most this factor, to end at t_end.
 STRETCH = 1.01
+
+
+@compiled_into
+def advance_by(
+    step: Callable[..., None], state_at: Callable[[Any, float, Floats], None], work: Any,
+    first: Floats, functions: Sequence[Function], system: Any, loops: Any, budget: int,
+    sense: float,
+) -> None:  # fmt: skip
+    """Integrate by explicit steps until more than ``budget`` calls of rhs are spent, or it is over.
+
+    step: tries one, given work, the functions rhs, project, accepted and watch, system and loops.
+    state_at: as of ``may_step``. first: the rates that a step starts with. sense: as of
+    ``count_turns``.
+    """
+    rhs, project, report = functions[0], functions[1], functions[2]
+    watch = functions[4] if work.switch_count != 0 else rhs
+    accepted = functions[3] if work.calls_accepted != 0 else rhs
+    limit = work.rhs_count + budget
+    while may_step(work, state_at, limit, project, report, system, loops):
+        steps, rejected, h = work.step_count, work.rejected_count, work.h
+        step(work, (rhs, project, accepted, watch), system, loops)
+        update_rounding(work, first, h, rejected, rhs, system, loops)
+        if work.calls_accepted != 0 and work.step_count > steps:
+            count_turns(work, accepted, system, loops, sense)
 
 
 @compiled

@@ -2,6 +2,7 @@
 
 import math
 
+from dap3d_core.assembly.evaluate import copy
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, MOST, NOISE
 from dap3d_core.kernels.array_types import Floats, SeparateFloats
 from dap3d_core.kernels.runtime.cache import compiled
@@ -13,13 +14,6 @@ _LARGEST = 1e100
 #: Beyond this magnitude a state is close to a pole, not in a short transition.
 POLE = 1e12
 NAN = math.nan
-
-
-@compiled
-def copy(out: SeparateFloats, x: Floats) -> None:
-    """``out = x``."""
-    for i in range(out.size):
-        out[i] = x[i]
 
 
 @compiled
@@ -94,8 +88,7 @@ def interpolate(out: SeparateFloats, terms: Floats, theta: float) -> None:
     ``r0 + theta (r1 + (1 - theta) (r2 + theta (r3 + (1 - theta) (r4 + ...))))``, HNW I (II.6.12).
     """
     last = terms.shape[0] - 1
-    for i in range(out.size):
-        out[i] = terms[last, i]
+    copy(out, terms[last])
     for row in range(last - 1, -1, -1):
         factor = theta if row % 2 == 0 else 1.0 - theta
         for i in range(out.size):

@@ -327,42 +327,30 @@ def solve_backwards(
 
 
 @compiled_into
-def solve_down(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
-    """Forward substitution by all nodes; K, x: pointers."""
-    for k in range(nodes.shape[0] - 1):
-        m = nodes[k, 0]
-        if m == 3:
-            if not is_idle(nodes[k, 2], K):
-                solve_forwards(k, 3, nodes, columns, K, x)
-        elif m == 5:
-            solve_forwards(k, 5, nodes, columns, K, x)
-        elif m >= LEAST_ROWS:
-            solve_panel_forwards(k, nodes, columns, K, x)
-        else:
-            solve_forwards(k, m, nodes, columns, K, x)
-
-
-@compiled_into
-def solve_up(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
-    """Backward substitution by all nodes; K, x: pointers."""
-    for k in range(nodes.shape[0] - 2, -1, -1):
-        m = nodes[k, 0]
-        if m == 3:
-            if not is_idle(nodes[k, 2], K):
-                solve_backwards(k, 3, nodes, columns, K, x)
-        elif m == 5:
-            solve_backwards(k, 5, nodes, columns, K, x)
-        elif m >= LEAST_ROWS:
-            solve_panel_backwards(k, nodes, columns, K, x)
-        else:
-            solve_backwards(k, m, nodes, columns, K, x)
+def substitute(
+    k: int, nodes: Integers, columns: Integers, K: Floats, x: Floats, step: Any, panel_step: Any
+) -> None:
+    """A step of node k, or that of a panel, by its size; K, x: pointers."""
+    m = nodes[k, 0]
+    if m == 3:
+        if not is_idle(nodes[k, 2], K):
+            step(k, 3, nodes, columns, K, x)
+    elif m == 5:
+        step(k, 5, nodes, columns, K, x)
+    elif m >= LEAST_ROWS:
+        panel_step(k, nodes, columns, K, x)
+    else:
+        step(k, m, nodes, columns, K, x)
 
 
 @compiled
 def solve(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
     """Solve K z = x in place, with the factors of K."""
-    solve_down(nodes, columns, pointer(K), pointer(x))
-    solve_up(nodes, columns, pointer(K), pointer(x))
+    K, x = pointer(K), pointer(x)
+    for k in range(nodes.shape[0] - 1):
+        substitute(k, nodes, columns, K, x, solve_forwards, solve_panel_forwards)
+    for k in range(nodes.shape[0] - 2, -1, -1):
+        substitute(k, nodes, columns, K, x, solve_backwards, solve_panel_backwards)
 
 
 @compiled

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 
 @compiled
@@ -63,6 +63,21 @@ def gather(source: int, target: int, rows: int, cols: int, flag: int, K: Floats)
             K[target + r * stride + c] += K[source + r * cols + c]
 
 
+@compiled_into
+def four_products(
+    K: Floats, o: int, m: int, x: Floats, f: int, n: int
+) -> tuple[float, float, float, float]:
+    """Products of four rows at o, m numbers each, with x from f on, of their first n numbers."""
+    s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
+    for t in range(n):
+        b = x[f + t]
+        s0 += K[o + t] * b
+        s1 += K[o + m + t] * b
+        s2 += K[o + 2 * m + t] * b
+        s3 += K[o + 3 * m + t] * b
+    return s0, s1, s2, s3
+
+
 @compiled
 def factor_diagonal(
     m: int, x: int, d: int, sign: float, K: Floats, smallest: Floats, drop: bool
@@ -83,13 +98,7 @@ def factor_diagonal(
         r = c + 1
         while r + 3 < m:
             o = d + r * m
-            s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
-            for t in range(c):
-                b = K[i + t]
-                s0 += K[o + t] * b
-                s1 += K[o + m + t] * b
-                s2 += K[o + 2 * m + t] * b
-                s3 += K[o + 3 * m + t] * b
+            s0, s1, s2, s3 = four_products(K, o, m, K, i, c)
             K[o + c] = (sign * K[o + c] - s0) * inverse
             K[o + m + c] = (sign * K[o + m + c] - s1) * inverse
             K[o + 2 * m + c] = (sign * K[o + 2 * m + c] - s2) * inverse
@@ -112,13 +121,7 @@ def divide(o: int, rows: int, m: int, d: int, K: Floats) -> None:
     while r + 3 < rows:
         for c in range(m):
             i = d + c * m
-            s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
-            for t in range(c):
-                b = K[i + t]
-                s0 += K[o + t] * b
-                s1 += K[o + m + t] * b
-                s2 += K[o + 2 * m + t] * b
-                s3 += K[o + 3 * m + t] * b
+            s0, s1, s2, s3 = four_products(K, o, m, K, i, c)
             b = K[i + c]
             K[o + c] = (K[o + c] - s0) * b
             K[o + m + c] = (K[o + m + c] - s1) * b
@@ -218,13 +221,7 @@ def solve_panel_forwards(k: int, nodes: Integers, columns: Integers, K: Floats, 
     for q in range(nodes[k, 4], nodes[k + 1, 4]):
         o, g, last = columns[q, 0], columns[q, 1], columns[q, 1] + columns[q, 2]
         while g + 3 < last:
-            s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
-            for t in range(m):
-                b = x[f + t]
-                s0 += K[o + t] * b
-                s1 += K[o + m + t] * b
-                s2 += K[o + 2 * m + t] * b
-                s3 += K[o + 3 * m + t] * b
+            s0, s1, s2, s3 = four_products(K, o, m, x, f, m)
             x[g] -= s0
             x[g + 1] -= s1
             x[g + 2] -= s2

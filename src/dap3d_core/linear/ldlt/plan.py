@@ -164,7 +164,7 @@ def list_updates(
             updates.extend(panels.gathered(k))
             updates.extend(panels.products(k))
         begins.append(len(updates))
-    return np.array(updates, dtype=np.int64).reshape(-1, 6), begins
+    return _table(updates, 6), begins
 
 
 class _Panels:
@@ -267,6 +267,14 @@ class Plan:
     hubs: Integers
     fill: int
     unfilled_size: int
+
+    @property
+    def entries(self) -> tuple[Integers, Integers, Integers]:
+        """Of each row of each block of D: its place in D, its row in the row vectors, its body."""
+        heights = self.blocks[:, 2]
+        within = np.arange(heights.sum()) - np.repeat(np.cumsum(heights) - heights, heights)
+        place, row, body = (np.repeat(self.blocks[:, c], heights) for c in (0, 3, 1))
+        return place + 6 * within, row + within, body
 
     @property
     def work(self) -> int:

@@ -61,8 +61,11 @@ class Ordering:
 
     @property
     def work(self) -> int:
-        """Multiplications of the factorisation, each with an addition."""
-        return sum(work_of(m, w) for m, w in self._fronts())
+        """Multiplications for factors, divisions and updates, each with an addition."""
+        return sum(
+            m * (m + 1) * (m + 2) // 6 + m * (m + 1) // 2 * w + m * w * (w + 1) // 2
+            for m, w in self._fronts()
+        )
 
     @property
     def widest(self) -> int:
@@ -70,14 +73,10 @@ class Ordering:
         return max((w for _, w in self._fronts()), default=0)
 
     def _fronts(self) -> Iterator[tuple[int, int]]:
+        """Of each node its rows, and how many it updates."""
         sizes = self.sizes
         for m, below in zip(sizes, self.below, strict=True):
             yield m, sum(sizes[k] for k in below)
-
-
-def work_of(m: int, w: int) -> int:
-    """Of a node of m rows that updates w: factors, division, update."""
-    return m * (m + 1) * (m + 2) // 6 + m * (m + 1) // 2 * w + m * w * (w + 1) // 2
 
 
 def with_panels(found: Ordering) -> Ordering:

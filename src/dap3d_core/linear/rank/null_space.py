@@ -78,7 +78,6 @@ class Problem:
 def problem_of(
     plan: Plan,
     D: Floats,
-    entries: tuple[Integers, Integers, Integers],
     chosen: Integers,
     tolerance: float,
     blur: float,
@@ -88,16 +87,20 @@ def problem_of(
     Args:
         plan: the elimination program.
         D: (block_size,) blocks as the joints gave them; not changed.
-        entries: place in D, row, body of each row of each block.
         chosen: rows that may depend on each other, as places in the row vectors, ascending.
         tolerance: a singular value below this part of the largest is zero.
         blur: one below this is zero, too.
     """
-    place, row, _ = entries
+    place, row, body = plan.entries
     blocks = np.where(np.isin(row, chosen)[:, None], D[place[:, None] + np.arange(6)], 0.0)
     square: Floats = np.bincount(row, np.sum(blocks**2, axis=1), plan.row_size).astype(float)
     square[square == 0.0] = 1.0
-    matrix = _matrix(plan, blocks, entries)[chosen].T.tocsr()
+    from scipy.sparse import csr_array
+
+    columns = 6 * (body - 1)[:, None] + np.arange(6)
+    shape = (plan.row_size, 6 * int(np.max(body)))
+    whole = csr_array((blocks.ravel(), (np.repeat(row, 6), columns.ravel())), shape=shape)
+    matrix = whole[chosen].T.tocsr()
     largest = _largest_value(matrix)
     zero = max(tolerance * largest, blur)
     return Problem(plan, chosen, blocks, place, square, matrix, largest, zero)
@@ -113,7 +116,7 @@ def by_elimination(problem: Problem, K: Floats) -> Floats | None:
         K: (matrix_size,) factors of these rows without those that depend on earlier ones.
     """
     plan, chosen, matrix = problem.plan, problem.chosen, problem.matrix
-    left_out = np.flatnonzero(_inverse_pivots(plan, K)[chosen] == 0.0)
+    left_out = np.flatnonzero(inverse_pivots(plan, K)[chosen] == 0.0)
     basis = np.zeros((len(left_out), len(chosen)))
     basis[np.arange(len(left_out)), left_out] = 1.0
     missed = matrix @ basis.T
@@ -175,7 +178,7 @@ def _solved(problem: Problem, K: Floats, X: Floats) -> Floats:
     return full[:, problem.chosen]
 
 
-def _inverse_pivots(plan: Plan, K: Floats) -> Floats:
+def inverse_pivots(plan: Plan, K: Floats) -> Floats:
     """(row_size,) diagonal of the factors, inverted; zero for what was left out."""
     result = np.zeros(plan.row_size)
     for size, first, diagonal, *_ in plan.nodes[:-1]:
@@ -194,15 +197,6 @@ def _factors(problem: Problem) -> Floats:
             K[diagonal : diagonal + size * size : size + 1] -= move
     factor(plan.nodes, plan.columns, plan.updates, K, np.zeros(plan.row_size), False)
     return K
-
-
-def _matrix(plan: Plan, blocks: Floats, entries: tuple[Integers, Integers, Integers]) -> Any:
-    from scipy.sparse import csr_array
-
-    _, row, body = entries
-    columns = 6 * (body - 1)[:, None] + np.arange(6)
-    shape = (plan.row_size, 6 * int(np.max(body)))
-    return csr_array((blocks.ravel(), (np.repeat(row, 6), columns.ravel())), shape=shape)
 
 
 def _largest_value(matrix: Any) -> float:

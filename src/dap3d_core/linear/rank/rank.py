@@ -173,17 +173,9 @@ def factor_independent(plan: Plan, D: Floats, K: Floats) -> None:
         K: (matrix_size,) gets the factors.
     """
     assemble(plan.targets, plan.contributions, D, K)
-    place, row, _ = _entries(plan)
+    place, row, _ = plan.entries
     squares = np.bincount(row, np.sum(D[place[:, None] + np.arange(6)] ** 2, axis=1), plan.row_size)
     factor(plan.nodes, plan.columns, plan.updates, K, PIVOT_TOLERANCE * squares, True)
-
-
-def _entries(plan: Plan) -> tuple[Integers, Integers, Integers]:
-    """Of each row of each block of D: its place in D, its row in the row vectors, its body."""
-    heights = plan.blocks[:, 2]
-    within = np.arange(heights.sum()) - np.repeat(np.cumsum(heights) - heights, heights)
-    place, row = (np.repeat(plan.blocks[:, c], heights) for c in (0, 3))
-    return place + 6 * within, row + within, np.repeat(plan.blocks[:, 1], heights)
 
 
 def has_loops(plan: Plan, D: Floats) -> bool:
@@ -224,7 +216,7 @@ def sparse_rank(
     if large:
         chosen = np.sort(np.concatenate(large))
         limit = tolerance_of(len(chosen), columns)
-        problem = problem_of(plan, D, _entries(plan), chosen, limit, blur)
+        problem = problem_of(plan, D, chosen, limit, blur)
         tolerance = max(tolerance, problem.zero / problem.largest)
         K = np.zeros(plan.matrix_size)
         factor_independent(plan, problem.D, K)
@@ -309,7 +301,7 @@ def _parts(plan: Plan, core: Sequence[int]) -> list[Integers]:
 
 def _dense(plan: Plan, D: Floats, part: Integers) -> Floats:
     """The Jacobian of some rows, on their own bodies alone."""
-    place, row, body = _entries(plan)
+    place, row, body = plan.entries
     mine = np.isin(row, part)
     place, row, body = place[mine], np.searchsorted(part, row[mine]), body[mine]
     columns, body = np.unique(body, return_inverse=True)

@@ -14,16 +14,21 @@ SETTINGS = {"t_end": 0.3, "rtol": 1e-9, "atol": 1e-11}
 
 
 @pytest.fixture
-def at_once(monkeypatch):
+def records(monkeypatch):
+    """Records of scenes, none of which is known yet."""
+    for name in ("_records", "_spent", "_reported"):
+        monkeypatch.setattr(change_over, name, {})
+    return change_over._records
+
+
+@pytest.fixture
+def at_once(monkeypatch, records):
     """Programs are made at the first call, in this process, for scenes that nobody knows yet."""
     monkeypatch.setattr(change_over, "LOAD_AFTER", 0.0)
     monkeypatch.setattr(change_over, "MAKE_AFTER", 0.0)
     monkeypatch.setattr(change_over, "BESIDE", False)
-    monkeypatch.setattr(change_over, "_records", {})
-    monkeypatch.setattr(change_over, "_spent", {})
-    monkeypatch.setattr(change_over, "_reported", {})
     monkeypatch.setattr(scene_program, "is_optimised", lambda evaluator: True)
-    return change_over._records
+    return records
 
 
 def general(scene, **settings):
@@ -238,10 +243,7 @@ def test_a_scene_without_program_runs(at_once, monkeypatch):
     assert "more than 10 instructions" in record.reason
 
 
-def test_short_runs_make_none(monkeypatch):
+def test_short_runs_make_none(records):
     """Nothing is even looked for before general code has taken a while."""
-    monkeypatch.setattr(change_over, "_records", {})
-    monkeypatch.setattr(change_over, "_spent", {})
-    monkeypatch.setattr(change_over, "_reported", {})
     dap.simulate("pen1", t_end=0.1)
-    assert change_over._records == {}
+    assert records == {}

@@ -12,7 +12,7 @@ from verification.test_stepping import ball, collide, slope, tower
 from verification.test_sticking_under_load import pendulum
 
 import dap3d_core as dap
-from dap3d_core.integrators.moreau import arrays, problem
+from dap3d_core.integrators.moreau import arrays
 
 
 def quadruped():
@@ -73,7 +73,7 @@ def test_blocks_have_the_results_of_squares(monkeypatch):
     """A tower of 120 unknowns, to rounding of the solves, but which corner carries what."""
     make, settings = CASES["tower"]
     blocks = dap.simulate(make(), **settings)
-    monkeypatch.setattr(problem, "SMALL", 120)
+    monkeypatch.setattr(arrays, "DENSE_SIZE", 120)
     assert dap.simulate(make(), **settings).u == pytest.approx(blocks.u, abs=1e-11)
 
 

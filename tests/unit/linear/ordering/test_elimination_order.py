@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from support.graphs import Case, chain, check_solution, star
 from support.internals import make_plan, rank
 from support.nets import fourbars, ladder, plate_net, rod_net
@@ -57,16 +59,10 @@ def test_separators_separate():
     neighbours = [set().union(*(of_body[b] for b in node.bodies)) - {k}
                   for k, node in enumerate(found.nodes)]  # fmt: skip
     stage = elimination_order.dissect(neighbours, [node.rows for node in found.nodes])
-    seen = set()
-    for start in range(len(stage)):
-        if stage[start] == 0 and start not in seen:
-            leaf, waiting = {start}, [start]
-            while waiting:
-                fresh = {m for m in neighbours[waiting.pop()] if stage[m] == 0} - leaf
-                leaf |= fresh
-                waiting += fresh
-            assert len(leaf) <= elimination_order.LEAF
-            seen |= leaf
+    edges = [(k, m) for k, others in enumerate(neighbours) for m in others
+             if stage[k] == stage[m] == 0]  # fmt: skip
+    graph = coo_array((np.ones(len(edges)), np.transpose(edges)), shape=(len(stage),) * 2)
+    assert np.bincount(connected_components(graph)[1]).max() <= elimination_order.LEAF
     assert max(stage) >= 3
     top = [k for k, s in enumerate(stage) if s == max(stage)]
     assert len(top) <= 25  # 20 joints lie between two lines of bodies: the least there can be
