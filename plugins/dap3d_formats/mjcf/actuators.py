@@ -46,7 +46,7 @@ def read_actuators(reader: MjcfReader, inertia: JointInertia, keyframe: Keyframe
     for element, start in zip(elements, starts, strict=True):
         if element.number("group", 0.0) in disabled:
             text = "an actuator of a group that is disabled"
-            document.source.remarks.leave_out(element.place, text)
+            reader.remarks.leave_out(element.place, text)
         elif element.name != "plugin":
             acting.append((element, _targets(reader, element), start))
     reading = ActuatorReader(reader, inertia, [(e, targets) for e, targets, _ in acting])
@@ -120,7 +120,7 @@ class ActuatorReader:
             self._note_bounds(element, line)
         else:
             text = f"an actuator <{element.name}>: {why}"
-            self.reader.document.source.remarks.leave_out(place, text, motion=True)
+            self.reader.remarks.leave_out(place, text, motion=True)
 
     def _note_bounds(self, element: XmlElement, line: Tendon | None) -> None:
         """Remark on bounds of joints that an actuator moves by a site or a tendon."""
@@ -130,7 +130,7 @@ class ActuatorReader:
         ranges = self.reader.force_ranges
         if any(ranges.get(name, UNBOUNDED) != UNBOUNDED for name in movers(self.reader, line)):
             text = "actuatorfrcrange of a joint that a site, a tendon or a muscle moves"
-            self.reader.document.source.remarks.leave_out(element.place, text, motion=True)
+            self.reader.remarks.leave_out(element.place, text, motion=True)
 
     def _line(self, element: XmlElement, targets: list[tuple[str, float]]) -> Tendon | None:
         """The line of the tendon, or of the joint of one coordinate, that an actuator acts on."""
@@ -189,7 +189,7 @@ class ActuatorReader:
 
     def _act_in_joint(self, element: XmlElement, actuator: Actuator, law: Any) -> None:
         """Add an actuator of a joint, whose ``gear`` is that of the transmission."""
-        remarks, (gain, constant, position, rate) = self.reader.document.source.remarks, law
+        remarks, (gain, constant, position, rate) = self.reader.remarks, law
         target, gear = self.reader.model.joints[actuator.joint], actuator.gear
         if rate > 0.0 and gain == -position:
             moved = self.inertia.of(actuator.joint)
@@ -219,7 +219,7 @@ class ActuatorReader:
         count = Counter(name for _, targets in self.elements for name, _ in targets)[joint]
         if given != UNBOUNDED and count > 1:
             text = "actuatorfrcrange of a joint with several actuators"
-            self.reader.document.source.remarks.leave_out(element.place, text, motion=True)
+            self.reader.remarks.leave_out(element.place, text, motion=True)
             return force
         low, high = np.clip(force, *given).tolist()
         return low, high

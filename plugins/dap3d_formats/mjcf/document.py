@@ -22,7 +22,7 @@ from dap3d_core.interface.formats import (
     euler_angles,
     from_quaternion,
 )
-from dap3d_formats.axes import along, unit
+from dap3d_formats.axes import along, cross, unit
 
 #: Elements that share the defaults of actuators.
 ACTUATORS = (
@@ -236,11 +236,6 @@ def _xyaxes(element: XmlElement) -> Any:
     y = unit(tuple(b - dot * a for a, b in zip(x, numbers[3:], strict=True)), element)
     z = cross(x, y)
     return [[x[k], y[k], z[k]] for k in range(3)]
-
-
-def cross(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, float, float]:
-    """The cross product."""
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 def _kind(tag: str) -> str:

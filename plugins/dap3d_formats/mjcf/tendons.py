@@ -87,7 +87,7 @@ def line_of(reader: MjcfReader, tendon: XmlElement, name: str) -> Tendon | None:
                 raise FormatError(f"<fixed>: there is no joint {joint!r}", place)
         if any(reader.model.joints[joint].kind not in (*SCALAR, "fixed") for joint, _ in terms):
             text = "a fixed tendon of a joint of several coordinates"
-            reader.document.source.remarks.leave_out(place, text, motion=True)
+            reader.remarks.leave_out(place, text, motion=True)
             return None
         return Tendon(name, terms=terms, place=place)
     points: list[tuple[str, Any]] = []
