@@ -14,7 +14,6 @@ from dap3d_core.cli.process.streams import prints_json
 
 if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
-    from dap3d_core.interface.codegen.kernel_arguments import KernelArgument
     from dap3d_core.interface.codegen.type_info import TypeInfo
     from dap3d_core.registry import Registry
 
@@ -41,17 +40,14 @@ def describe(keyword: str, *, names: bool, source: bool, allow_code: bool) -> in
     """
     import dap3d_core as dap
     from dap3d_core.cli.commands.describe_model import is_model, model_data, show_model
-    from dap3d_core.cli.console.console import print_json, stdout
+    from dap3d_core.cli.console.console import print_json, show_data, stdout
 
     registry = dap.load_registry()
     if not _is_type(registry, keyword) and is_model(keyword):
         if names:
             raise Refused(f"--names is of types, and {keyword} is a model; give a keyword")
         model = model_data(keyword, allow_code=allow_code, source=source)
-        if prints_json():
-            print_json({"model": model})
-        else:
-            show_model(stdout(), model)
+        show_data({"model": model}, lambda console: show_model(console, model))
         return DONE
     types = [type_data(registry, kind, word) for kind, word in _types(registry, keyword)]
     if prints_json():
@@ -135,7 +131,15 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
             for name, spec in specs_of(type_).items()
             if spec.given
         ],
-        "names": list(map(_name_data, type_info.names.values())),
+        "names": [
+            {
+                "name": one.name,
+                "shape": list(one.shape),
+                "level": "velocity" if one.velocity else "position",
+                "doc": one.doc,
+            }
+            for one in type_info.names.values()
+        ],
         "variants": [
             {"with": dict(conditions), "class": e.type.__name__, **_class_data(e)}
             for conditions, e in type_info.variants
@@ -148,16 +152,6 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
             else {}
         ),
         **({"arguments": type_.arguments} if kind == "function" else {}),
-    }
-
-
-def _name_data(argument: "KernelArgument") -> dict[str, Any]:
-    """A name that kernels may use."""
-    return {
-        "name": argument.name,
-        "shape": list(argument.shape),
-        "level": "velocity" if argument.velocity else "position",
-        "doc": argument.doc,
     }
 
 
