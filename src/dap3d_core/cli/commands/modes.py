@@ -1,7 +1,6 @@
 """``dap3d modes``: frequencies, damping, stability and mode shapes of a model about a state."""
 
 import math
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -134,14 +133,9 @@ def _draw(found: Any, names: list[str], plot: str | None, *, force: bool) -> Non
 
 def _targets(plot: str | None, output: str | None, force: bool) -> list[Path]:
     """The files to write; Refused where one cannot be written, or is no picture."""
-    from dap3d_core.cli.framework.paths import RESULTS, refuse_all, writable
+    from dap3d_core.cli.framework.paths import RESULTS, picture_checks, refuse_all, writable
 
-    checks: list[Callable[[], object]] = []
-    if plot is not None:
-        from dap3d_core.plot.figure_file import check_suffix
-
-        checks.append(partial(check_suffix, Path(plot)))
-        checks.append(partial(writable, Path(plot), force=force))
+    checks = [] if plot is None else picture_checks(Path(plot), force=force)
     if output is not None:
         checks.append(partial(writable, Path(output), force=force, kinds=RESULTS))
     refuse_all(*checks)
