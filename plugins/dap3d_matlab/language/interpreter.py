@@ -15,6 +15,7 @@ from dap3d_matlab.language.values import (
     Broken,
     GivenValue,
     Struct,
+    as_array,
     copied,
     kind_of,
 )
@@ -190,16 +191,13 @@ class _Interpreter:
 
     def _struct(self, owner: "Node") -> Struct:
         """The structure of a field, to be changed in place."""
-        if owner.type == "identifier":
-            name = text_of(owner)
-            if name not in self.variables:
-                what = f"{name} is not defined yet"
-                raise RefusalError(owner, what, f"begin with {name} = Body_struct; or its like")
-            value = self.expressions.value(owner)
-            if isinstance(value, list) and len(value) == 1:
-                value = value[0]
-        else:
-            value = self.expressions.value(owner)
+        name = text_of(owner)
+        if owner.type == "identifier" and name not in self.variables:
+            what = f"{name} is not defined yet"
+            raise RefusalError(owner, what, f"begin with {name} = Body_struct; or its like")
+        value = self.expressions.value(owner)
+        if isinstance(value, list) and len(value) == 1:
+            value = value[0]
         if isinstance(value, Broken):
             raise ReportedError
         if not isinstance(value, Struct):
@@ -227,10 +225,7 @@ class _Interpreter:
     def _set_struct(
         self, target: "Node", name: str, array: Any, arguments: list["Node"], value: Struct
     ) -> None:
-        if isinstance(array, Struct):
-            array = [array]
-        if isinstance(array, np.ndarray) and array.size == 0:
-            array = []
+        array = as_array(array)
         if not isinstance(array, list):
             raise RefusalError(target, f"{name} is {kind_of(array)}, no array of structures")
         kinds = {v.structure.kind for v in array if isinstance(v, Struct)}

@@ -84,6 +84,13 @@ def copied(value: Any) -> Any:
     return value.copy() if isinstance(value, np.ndarray) else value
 
 
+def as_array(value: Any) -> Any:
+    """One structure, and no entries, as an array of structures; other values as they are."""
+    if isinstance(value, Struct):
+        return [value]
+    return [] if isinstance(value, np.ndarray) and value.size == 0 else value
+
+
 def size_of(value: Numbers) -> str:
     """The size of a matrix, for messages."""
     return f"{value.shape[0]}x{value.shape[1]}"
