@@ -14,6 +14,7 @@ from dap3d_core.cli.process.streams import prints_json
 
 if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
+    from dap3d_core.interface.codegen.kernel_arguments import KernelArgument
     from dap3d_core.interface.codegen.type_info import TypeInfo
     from dap3d_core.registry import Registry
 
@@ -131,15 +132,7 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
             for name, spec in specs_of(type_).items()
             if spec.given
         ],
-        "names": [
-            {
-                "name": one.name,
-                "shape": list(one.shape),
-                "level": "velocity" if one.velocity else "position",
-                "doc": one.doc,
-            }
-            for one in type_info.names.values()
-        ],
+        "names": list(map(_name_data, type_info.names.values())),
         "variants": [
             {"with": dict(conditions), "class": e.type.__name__, **_class_data(e)}
             for conditions, e in type_info.variants
@@ -152,6 +145,16 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
             else {}
         ),
         **({"arguments": type_.arguments} if kind == "function" else {}),
+    }
+
+
+def _name_data(argument: "KernelArgument") -> dict[str, Any]:
+    """A name that kernels may use."""
+    return {
+        "name": argument.name,
+        "shape": list(argument.shape),
+        "level": "velocity" if argument.velocity else "position",
+        "doc": argument.doc,
     }
 
 
