@@ -31,18 +31,18 @@ def read_equalities(reader: MjcfReader) -> None:
         FormatError: one names something that is not there.
     """
     remarks, document = reader.remarks, reader.document
-    holders = document.root.all("equality")
-    for holder in () if document.disables("equality", "constraint") else holders:
-        for given in holder:
-            element = document.settled_equality(given)
-            if element.get("active", "true") == "false":
-                remarks.leave_out(element.place, "equalities that are not active")
-            elif element.name in ("connect", "weld"):
-                _close(reader, element)
-            elif element.name == "joint":
-                _couple(reader, element)
-            elif element.name == "tendon":
-                _couple_by_tendon(reader, element)
+    if document.disables("equality", "constraint"):
+        return
+    for given in document.section("equality"):
+        element = document.settled_equality(given)
+        if element.get("active", "true") == "false":
+            remarks.leave_out(element.place, "equalities that are not active")
+        elif element.name in ("connect", "weld"):
+            _close(reader, element)
+        elif element.name == "joint":
+            _couple(reader, element)
+        elif element.name == "tendon":
+            _couple_by_tendon(reader, element)
 
 
 def _link(reader: MjcfReader, element: XmlElement, key: str) -> str:

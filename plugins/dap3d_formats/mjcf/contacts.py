@@ -24,17 +24,16 @@ def read_contacts(reader: MjcfReader) -> None:
         FormatError: one names a body that is not there.
     """
     document, model = reader.document, reader.model
-    for holder in document.root.all("contact"):
-        for element in holder.all("exclude"):
-            ends = element.require("body1"), element.require("body2")
-            for name in ends:
-                if name not in (*model.links, WORLD) and document.source.contacts:
-                    raise FormatError(f"there is no body {name}", element.place)
-            if reader.ground in model.links or WORLD not in ends:
-                one, other = (reader.ground if name == WORLD else name for name in ends)
-                model.excluded.append((one, other))
+    for element in document.section("contact", "exclude"):
+        ends = element.require("body1"), element.require("body2")
+        for name in ends:
+            if name not in (*model.links, WORLD) and document.source.contacts:
+                raise FormatError(f"there is no body {name}", element.place)
+        if reader.ground in model.links or WORLD not in ends:
+            one, other = (reader.ground if name == WORLD else name for name in ends)
+            model.excluded.append((one, other))
     if document.source.contacts and not document.disables("contact", "constraint"):
-        pairs = [p for holder in document.root.all("contact") for p in holder.all("pair")]
+        pairs = document.section("contact", "pair")
         _meet(reader, [slots for p in pairs if (slots := _pair(reader, p)) is not None])
 
 

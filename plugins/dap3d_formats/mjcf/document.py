@@ -114,6 +114,10 @@ class Document:
                 asset.attributes.setdefault("name", Path(asset.attributes["file"]).stem)
         return cls(source, root, {"": Settings.of(root, folder)})
 
+    def section(self, tag: str, name: str = "") -> list[XmlElement]:
+        """The elements of all sections of a tag, or those of one name alone."""
+        return [one for holder in self.root.all(tag) for one in holder if name in ("", one.name)]
+
     def settled(self, element: XmlElement, childclass: str) -> XmlElement:
         """An element with the attributes of its class.
 
@@ -163,7 +167,7 @@ class Document:
 
     def disables(self, *names: str) -> bool:
         """True if a flag of one of these names is off."""
-        flags = [flag for option in self.root.all("option") for flag in option.all("flag")]
+        flags = self.section("option", "flag")
         return any(flag.get(name) == "disable" for flag in flags for name in names)
 
     def bounds(self, element: XmlElement, key: str, limited: str) -> tuple[float, float]:

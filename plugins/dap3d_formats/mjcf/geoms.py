@@ -61,7 +61,7 @@ class Geoms:
     @classmethod
     def of(cls, document: Document) -> "Geoms":
         """The reader, with the assets of the document."""
-        pairs = [pair for one in document.root.all("contact") for pair in one.all("pair")]
+        pairs = document.section("contact", "pair")
         geoms = cls(document, paired={p.get(k) or "" for p in pairs for k in ("geom1", "geom2")})
         for asset in document.root.all("asset"):
             for mesh in asset.all("mesh"):
