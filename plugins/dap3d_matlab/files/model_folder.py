@@ -5,6 +5,7 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.interface.formats import Place
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import MISSING, Mistake, SceneError
 from dap3d_core.scene.errors import file_error
@@ -12,7 +13,6 @@ from dap3d_matlab.files.report import FileFacts, Remark, remark
 from dap3d_matlab.language.interpreter import Workspace, follow
 from dap3d_matlab.language.parse import (
     Grammar,
-    Place,
     SourceFile,
     m_files,
     read_source,

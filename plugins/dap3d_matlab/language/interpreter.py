@@ -5,10 +5,11 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from dap3d_core.interface.formats import Place
 from dap3d_core.scene import Mistake
 from dap3d_matlab.language.expressions import Expressions, arguments_of, check_field, named_children
 from dap3d_matlab.language.operators import RefusalError, ReportedError, numbers
-from dap3d_matlab.language.parse import Place, SourceFile, excerpt, text_of
+from dap3d_matlab.language.parse import SourceFile, excerpt, text_of
 from dap3d_matlab.language.values import (
     BROKEN,
     LARGEST_MATRIX,

@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_matlab.language.parse import Place
+from dap3d_core.interface.formats import Place
 from dap3d_matlab.language.structures import STRUCTURES, Default, Structure
 
 #: A matrix of numbers; a single number is 1 x 1.
