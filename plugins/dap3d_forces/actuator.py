@@ -109,9 +109,7 @@ class TurningLater(Turning, activation="lag"):
 
     states = ("z",)
 
-    def rate(control, control_min, control_max, activation_min, activation_max, time, z):
-        z_dot = (within(control, control_min, control_max) - z) / time
-        return kept(z_dot, z, activation_min, activation_max)
+    rate = SlidingLater.rate
 
     def wrench(a_j, theta, theta_dot, z, gain, bias, k, c, force_min, force_max):
         return pair(within(gain * z + bias - k * theta - c * theta_dot, force_min, force_max), a_j)
@@ -120,9 +118,7 @@ class TurningLater(Turning, activation="lag"):
 class TurningOn(TurningLater, activation="integral"):
     """A moment by the integral of a control."""
 
-    def rate(control, control_min, control_max, activation_min, activation_max, time, z):
-        z_dot = within(control, control_min, control_max) / time
-        return kept(z_dot, z, activation_min, activation_max)
+    rate = SlidingOn.rate
 
 
 def kept(z_dot, z, least, most):

@@ -21,14 +21,15 @@ def unit(axis: tuple[float, ...], element: XmlElement) -> tuple[float, ...]:
 def across(normal: tuple[float, ...]) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Two unit vectors x, y with x cross y along a unit vector."""
     k = min(range(3), key=lambda n: abs(normal[n]))
-    n = normal
-    e = [0.0, 0.0, 0.0]
-    e[k] = 1.0
-    y = (n[1] * e[2] - n[2] * e[1], n[2] * e[0] - n[0] * e[2], n[0] * e[1] - n[1] * e[0])
+    y = cross(normal, tuple(float(n == k) for n in range(3)))
     length = sum(c * c for c in y) ** 0.5
     y = (y[0] / length, y[1] / length, y[2] / length)
-    x = (y[1] * n[2] - y[2] * n[1], y[2] * n[0] - y[0] * n[2], y[0] * n[1] - y[1] * n[0])
-    return x, y
+    return cross(y, normal), y
+
+
+def cross(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, float, float]:
+    """The cross product."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 def along(z: tuple[float, ...]) -> Any:

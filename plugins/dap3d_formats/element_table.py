@@ -7,6 +7,7 @@ MOVES the motion is another. A key ``name=value`` is of an attribute with this v
 """
 
 from collections.abc import Mapping
+from functools import partial
 
 from dap3d_core.interface.formats import FormatError, Remarks, XmlElement
 
@@ -19,29 +20,16 @@ Word = tuple[str, str]
 Table = Mapping[str, Mapping[str, Word]]
 
 
-def taken(names: str = "", words: str = "") -> dict[str, Word]:
-    """Attributes, or the element itself for "", that are taken as they are."""
-    return dict.fromkeys(names.split() or [""], (TAKEN, words))
+def _row(state: str, names: str = "", words: str = "") -> dict[str, Word]:
+    """The words for attributes, or for the element itself where there are no names."""
+    return dict.fromkeys(names.split() or [""], (state, words))
 
 
-def translated(names: str, words: str) -> dict[str, Word]:
-    """Attributes, or the element itself for "", that are said in another way."""
-    return dict.fromkeys(names.split() or [""], (TRANSLATED, words))
-
-
-def noted(names: str, words: str) -> dict[str, Word]:
-    """Attributes, or the element itself for "", that are left out with a note."""
-    return dict.fromkeys(names.split() or [""], (NOTED, words))
-
-
-def moves(names: str, words: str) -> dict[str, Word]:
-    """As ``noted``, of what changes the motion."""
-    return dict.fromkeys(names.split() or [""], (MOVES, words))
-
-
-def refused(names: str, words: str) -> dict[str, Word]:
-    """Attributes, or the element itself for "", with which no model is imported."""
-    return dict.fromkeys(names.split() or [""], (REFUSED, words))
+taken = partial(_row, TAKEN)
+translated = partial(_row, TRANSLATED)
+noted = partial(_row, NOTED)
+moves = partial(_row, MOVES)
+refused = partial(_row, REFUSED)
 
 
 def note_elements(root: XmlElement, table: Table, remarks: Remarks) -> None:
@@ -58,25 +46,22 @@ def note_elements(root: XmlElement, table: Table, remarks: Remarks) -> None:
         if row is None:
             remarks.leave_out(element.place, f"<{element.name}>: an unknown element")
             continue
-        state, words = row.get("", (TAKEN, ""))
-        if state == REFUSED:
-            raise FormatError(f"<{element.name}>: {words}", element.place)
-        if state in (NOTED, MOVES):
-            text = f"<{element.name}>: {words}"
-            remarks.leave_out(element.place, text, motion=state == MOVES)
+        if _is_left_out(row.get("", (TAKEN, "")), f"<{element.name}>", element, remarks):
             continue
-        for name in element.attributes:
-            _note(element, name, row, remarks)
+        for name, value in element.attributes.items():
+            if not name.startswith("xmlns") and ":" not in name:
+                usual = row.get(name, (NOTED, "an unknown attribute"))
+                word = row.get(f"{name}={value.strip()}", usual)
+                _is_left_out(word, f"{name} of <{element.name}>", element, remarks)
         stack += [(child, element.name) for child in reversed(element.children)]
 
 
-def _note(element: XmlElement, name: str, row: Mapping[str, Word], remarks: Remarks) -> None:
-    if name.startswith("xmlns") or ":" in name:
-        return
-    usual = row.get(name, (NOTED, "an unknown attribute"))
-    state, words = row.get(f"{name}={element.attributes[name].strip()}", usual)
+def _is_left_out(word: Word, label: str, element: XmlElement, remarks: Remarks) -> bool:
+    """True, with a remark, for what is left out."""
+    state, reason = word
     if state == REFUSED:
-        raise FormatError(f"{name} of <{element.name}>: {words}", element.place)
-    if state in (NOTED, MOVES):
-        text = f"{name} of <{element.name}>: {words}"
-        remarks.leave_out(element.place, text, motion=state == MOVES)
+        raise FormatError(f"{label}: {reason}", element.place)
+    left_out = state in (NOTED, MOVES)
+    if left_out:
+        remarks.leave_out(element.place, f"{label}: {reason}", motion=state == MOVES)
+    return left_out

@@ -5,12 +5,11 @@ from pathlib import Path
 
 import attrs
 
-from dap3d_core.interface.formats import FolderImporter
+from dap3d_core.interface.formats import FolderImporter, Place
 from dap3d_core.registry import Registry
 from dap3d_core.scene import Mistake, Scene, SceneError, check
 from dap3d_matlab.files.model_folder import Model, read_folder
 from dap3d_matlab.files.report import ImportReport, remark
-from dap3d_matlab.language.parse import Place
 from dap3d_matlab.translate.bodies import add_animation, add_bodies, add_geometry
 from dap3d_matlab.translate.elements import add_forces, add_functions, add_joints
 from dap3d_matlab.translate.fields import NAMES, Fields, name_of

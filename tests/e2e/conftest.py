@@ -2,6 +2,7 @@
 Compiled code is that of all tests, but where a test is about it."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,8 @@ from pathlib import Path
 import pytest
 from support.falling import SCENE
 from support.process import UNOPTIMISED
+
+import dap3d_core as dap
 
 COMMAND = [str(Path(sys.executable).with_name("dap3d"))]
 
@@ -74,6 +77,21 @@ class CommandLine:
 def dap3d(tmp_path, capfd):
     """The command line in a folder of its own, ``dap3d.folder``."""
     return CommandLine(tmp_path, capfd)
+
+
+@pytest.fixture(scope="session")
+def pen1_file(tmp_path_factory):
+    """The file of a short run of pen1, six instants."""
+    file = tmp_path_factory.mktemp("pen1") / "pen1.nc"
+    dap.simulate("pen1", t_end=0.1, dt=0.02).save(file)
+    return file
+
+
+@pytest.fixture
+def pen1(dap3d, pen1_file):
+    """That result, which lies in the folder of the command line as pen1.nc."""
+    shutil.copy(pen1_file, dap3d.folder)
+    return dap.open(pen1_file)
 
 
 @pytest.fixture

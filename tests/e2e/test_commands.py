@@ -1,7 +1,6 @@
 """The other commands, as a user meets them."""
 
 import json
-import shutil
 
 import numpy as np
 import pytest
@@ -69,36 +68,21 @@ def test_models_and_plugins_are_listed(dap3d):
     assert "weight" in dap3d("plugins").stdout
 
 
-@pytest.fixture(scope="module")
-def run_file(tmp_path_factory):
-    """The file of a short run of pen1."""
-    file = tmp_path_factory.mktemp("run") / "pen1.nc"
-    dap.simulate("pen1", t_end=0.1).save(file)
-    return file
-
-
-@pytest.fixture
-def result(dap3d, run_file):
-    """The result of a short run, which lies in the folder as pen1.nc."""
-    shutil.copy(run_file, dap3d.folder / "pen1.nc")
-    return dap.open(run_file)
-
-
 @pytest.mark.slow
-def test_info_says_what_a_file_holds(dap3d, result):
+def test_info_says_what_a_file_holds(dap3d, pen1):
     found = json.loads(dap3d("info", "pen1.nc", "--json").stdout)
     assert (found["status"], found["instants"], found["t_end"]) == ("done", 6, 0.1)
     assert found["body_names"] == ["cone"]
     assert found["settings"]["rtol"] == 1e-8
-    assert found["ledger"].keys() == result.ledger.keys()
+    assert found["ledger"].keys() == pen1.ledger.keys()
     shown = dap3d("info", "pen1.nc").stdout
     for words in ("cone", "J1", "llvmlite", "energy", "dop853", "project on"):
         assert words in shown
 
 
 @pytest.mark.slow
-def test_plot_draws_into_files(dap3d, result):
-    assert dap3d("plot", "pen1.nc").returncode == 0
+def test_plot_draws_into_files(dap3d, pen1):
+    dap3d.succeed("plot", "pen1.nc")
     assert (dap3d.folder / "pen1.png").read_bytes().startswith(b"\x89PNG")
     dap3d.succeed("plot", "pen1.nc", "cone.r.z", "J1.force", "--x", "cone.r.y", "-o", "a.svg")
     assert "position of cone" in (dap3d.folder / "a.svg").read_text()

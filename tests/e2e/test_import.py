@@ -18,11 +18,9 @@ def arm(tmp_path, monkeypatch):
 
 
 def test_a_model_becomes_a_folder_that_runs(dap3d, arm):
-    done = dap3d("import", "arm.urdf")
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("import", "arm.urdf")
     assert "arm.urdf:36: " in done.stdout
-    done = dap3d("run", "arm", "--t-end", "0.05")
-    assert done.returncode == 0, done.stderr
+    dap3d.succeed("run", "arm", "--t-end", "0.05")
 
 
 def test_the_report_for_programs(dap3d, arm):
@@ -40,13 +38,14 @@ def test_limits_may_be_hard_or_off(dap3d, arm):
     scene = (arm / "arm" / "scene.toml").read_text()
     assert "lower = -1.0" in scene
     assert "_stop" not in scene
-    assert dap3d("import", "arm.urdf", "--limits", "off", "-o", "free").returncode == 0
+    dap3d.succeed("import", "arm.urdf", "--limits", "off", "-o", "free")
     assert "_stop" not in (arm / "free" / "scene.toml").read_text()
 
 
 def test_nothing_is_overwritten_without_force(dap3d, refuse, arm):
-    assert dap3d("import", "arm.urdf").returncode == 0
+    dap3d.succeed("import", "arm.urdf")
     assert "exists; --force" in refuse("import", "arm.urdf")
-    assert dap3d("import", "arm.urdf", "--force").returncode == 0
-    assert dap3d("export", "arm", "--format", "mjcf").returncode == 0
+    dap3d.succeed("import", "arm.urdf", "--force")
+    dap3d.succeed("export", "arm", "--format", "mjcf")
     assert "exists; --force" in refuse("export", "arm", "--format", "mjcf")
+    assert dap3d.succeed("export", "arm", "--format", "mjcf", "--force", "--quiet").stdout == ""

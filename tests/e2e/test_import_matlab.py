@@ -15,7 +15,7 @@ import dap3d_core as dap
 
 
 def test_what_is_written_reads_as_the_scene_of_the_library(dap3d):
-    assert dap3d("import-matlab", MODELS / "tri").returncode == 0
+    dap3d.succeed("import-matlab", MODELS / "tri")
     scene, _ = dap.import_matlab(MODELS / "tri")
     assert dap.load(dap3d.folder / "scene.toml") == scene
 
@@ -49,7 +49,7 @@ def test_a_stub_is_written_only_when_asked_for_and_refused_until_it_is_filled_in
     assert [p.name for p in dap3d.folder.iterdir()] == ["scene.toml"]
     run = dap3d("run", "scene.toml", "--t-end", "1", "--dt", "0.1", "--allow-code")
     assert run.returncode == 2, "there is no type of this name"
-    assert dap3d("import-matlab", MODELS / "ball1", "--stub", "--force").returncode == 0
+    dap3d.succeed("import-matlab", MODELS / "ball1", "--stub", "--force")
     run = dap3d("run", "scene.toml", "--t-end", "1", "--dt", "0.1", "--allow-code")
     assert run.returncode == 2
     assert "write it here" in run.stderr
@@ -83,7 +83,7 @@ def test_files_are_not_overwritten_unasked(dap3d, refuse):
 
 def test_a_folder_takes_a_scene_toml(dap3d):
     (dap3d.folder / "mine").mkdir()
-    assert dap3d("import-matlab", MODELS / "pen1", "-o", "mine").returncode == 0
+    dap3d.succeed("import-matlab", MODELS / "pen1", "-o", "mine")
     assert (dap3d.folder / "mine" / "scene.toml").exists()
 
 

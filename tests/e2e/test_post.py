@@ -2,30 +2,12 @@
 
 import csv
 import json
-import shutil
 
 import numpy as np
 import pytest
 import xarray
 
 import dap3d_core as dap
-
-
-@pytest.fixture(scope="module")
-def run_files(tmp_path_factory):
-    """Files of short runs, by model."""
-    folder = tmp_path_factory.mktemp("runs")
-    for name, code in (("pen1", False), ("bodies2", False), ("ball1", True)):
-        dap.simulate(name, t_end=0.1, allow_code=code).save(folder / f"{name}.nc")
-    return folder
-
-
-@pytest.fixture
-def result(dap3d, run_files):
-    """The result of a short run of pen1; all runs lie in the folder of the command line."""
-    for file in run_files.iterdir():
-        shutil.copy(file, dap3d.folder)
-    return dap.open(run_files / "pen1.nc")
 
 
 def table_of(file):
@@ -36,36 +18,36 @@ def table_of(file):
 
 
 @pytest.mark.slow
-def test_a_table_reads_back_bit_for_bit(dap3d, result):
+def test_a_table_reads_back_bit_for_bit(dap3d, pen1):
     dap3d.succeed("post", "pen1.nc", "-o", "all.csv", "--jac")
     column = table_of(dap3d.folder / "all.csv")
     for name, values in (
-        ("t [s]", result.t),
-        ("cone.r.z [m]", result.r[:, 0, 2]),
-        ("cone.p.e0 [1]", result.p[:, 0, 0]),
-        ("cone.wpd.y [rad/s^2]", result.wpd[:, 0, 1]),
-        ("P1.r.x [m]", result.rP[:, 0, 0]),
-        ("animation.4.v.z [m/s]", result.rPd[:, 5, 2]),
-        ("animation.1.a.x [m/s^2]", result.rPdd[:, 2, 0]),
-        ("J1.lambda.3 [SI]", result.Lam[:, 2]),
-        ("J1.i.force_body.y [N]", result.reaction("J1")["i"].force_body[:, 1]),
-        ("J1.j.moment.z [N m]", result.reaction("J1")["j"].moment[:, 2]),
-        ("energy.total [J]", result.energy.total),
-        ("constraint.position [SI]", result.arrays.position_residual),
-        ("J1.Jac.1.cone.rd.x [SI]", result.Jac[:, 0, 0]),
-        ("J1.Jac.3.cone.w.z [SI]", result.Jac[:, 2, 5]),
+        ("t [s]", pen1.t),
+        ("cone.r.z [m]", pen1.r[:, 0, 2]),
+        ("cone.p.e0 [1]", pen1.p[:, 0, 0]),
+        ("cone.wpd.y [rad/s^2]", pen1.wpd[:, 0, 1]),
+        ("P1.r.x [m]", pen1.rP[:, 0, 0]),
+        ("animation.4.v.z [m/s]", pen1.rPd[:, 5, 2]),
+        ("animation.1.a.x [m/s^2]", pen1.rPdd[:, 2, 0]),
+        ("J1.lambda.3 [SI]", pen1.Lam[:, 2]),
+        ("J1.i.force_body.y [N]", pen1.reaction("J1")["i"].force_body[:, 1]),
+        ("J1.j.moment.z [N m]", pen1.reaction("J1")["j"].moment[:, 2]),
+        ("energy.total [J]", pen1.energy.total),
+        ("constraint.position [SI]", pen1.arrays.position_residual),
+        ("J1.Jac.1.cone.rd.x [SI]", pen1.Jac[:, 0, 0]),
+        ("J1.Jac.3.cone.w.z [SI]", pen1.Jac[:, 2, 5]),
     ):
         assert column[name].tolist() == values.tolist(), name
     for heading in column:  # what the table calls it, plots understand
         name, unit = heading[:-1].split(" [")
         if ".Jac." not in name:
-            quantity = result.quantity(name)
+            quantity = pen1.quantity(name)
             assert quantity.values.tolist() == column[heading].tolist()
             assert quantity.unit == unit
 
 
 @pytest.mark.slow
-def test_what_was_written_as_json(dap3d, result):
+def test_what_was_written_as_json(dap3d, pen1):
     done = dap3d("post", "pen1.nc", "--json")
     found = json.loads(done.stdout)
     assert found["file"] == "pen1-post.nc"
@@ -84,8 +66,9 @@ def test_what_was_written_as_json(dap3d, result):
 
 
 @pytest.mark.slow
-def test_types_of_the_model_itself_are_loaded_only_when_allowed(dap3d, result, refuse):
+def test_types_of_the_model_itself_are_loaded_only_when_allowed(dap3d, refuse):
     """A result does not say where they stand; the message says what to do."""
+    dap.simulate("ball1", t_end=0.1, allow_code=True).save(dap3d.folder / "ball1.nc")
     words = refuse("post", "ball1.nc", "contact.force", "-o", "a.csv")
     for part in ("ball-contact", "--model FOLDER --allow-code", "model=FOLDER, allow_code=True"):
         assert part in words
@@ -99,23 +82,17 @@ def test_types_of_the_model_itself_are_loaded_only_when_allowed(dap3d, result, r
 
 
 @pytest.mark.slow
-def test_reactions_that_cannot_be_had_are_left_out_and_told(dap3d, result):
+def test_reactions_that_cannot_be_had_are_left_out_and_told(dap3d, pen1):
     """The types of the joints are blocked, as if the package that brought them were gone."""
     done = dap3d.succeed("post", "pen1.nc", "-o", "a.nc", DAP3D_BLOCK="dap3d")
     assert "reactions are left out: the model of pen1.nc cannot be made again" in done.stderr
     with xarray.open_dataset(dap3d.folder / "a.nc") as data:
         assert "reaction_force" not in data
-        assert data["Lam"].values.tolist() == result.Lam.tolist()
+        assert data["Lam"].values.tolist() == pen1.Lam.tolist()
     told = json.loads(dap3d("post", "pen1.nc", "-o", "b.csv", "--json", DAP3D_BLOCK="dap3d").stdout)
     assert told["notes"][0].startswith("reactions are left out")
     assert dap3d("post", "pen1.nc", "--jac", "-o", "c.nc", DAP3D_BLOCK="dap3d").returncode == 2
     assert not (dap3d.folder / "c.nc").exists()
-
-
-@pytest.fixture
-def pen1(dap3d):
-    """A result in the folder of the command line."""
-    dap.simulate("pen1", t_end=0.1, dt=0.02).save(dap3d.folder / "pen1.nc")
 
 
 def test_each_format_has_its_file(dap3d, refuse, pen1):

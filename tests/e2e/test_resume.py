@@ -132,22 +132,21 @@ def test_a_run_is_terminated_resumed_and_made_again(dap3d):
     assert facts["status"] == "done"
     assert facts["checkpoint"] is None
     assert [f.name for f in dap3d.folder.iterdir()] == ["pen1.nc"]
-    assert dap3d("run", *settings, "-o", "whole.nc").returncode == 0
+    dap3d.succeed("run", *settings, "-o", "whole.nc")
     one, other = (dap.open(dap3d.folder / name) for name in ("pen1.nc", "whole.nc"))
     assert one.u.tobytes() == other.u.tobytes()
     again = dap3d.succeed("rerun", "pen1.nc")
     assert "equal bit for bit; 1,601 instants compared" in again.stdout
 
 
-def test_rerun_says_what_differs(dap3d, monkeypatch, capfd):
+def test_rerun_says_what_differs(dap3d, pen1, monkeypatch, capfd):
     """A result that was made with other digits: exit code 1, the arrays and by how much."""
     from dap3d_core.cli import main
 
-    result = dap.simulate("pen1", t_end=0.1, dt=0.02)
-    u = result.u.copy()
+    u = pen1.u.copy()
     u[3, 0] += 1e-9
-    result.arrays = attrs.evolve(result.arrays, u=u)
-    result.save(dap3d.folder / "other.nc")
+    pen1.arrays = attrs.evolve(pen1.arrays, u=u)
+    pen1.save(dap3d.folder / "other.nc")
     monkeypatch.chdir(dap3d.folder)
     monkeypatch.setenv("COLUMNS", "60")
     assert main(["rerun", "other.nc"]) == 1

@@ -55,12 +55,6 @@ def chain(count):
 # ---------------------------------------------------------------- the command
 
 
-@pytest.fixture
-def pen1(dap3d):
-    """A result in the folder of the command line."""
-    dap.simulate("pen1", t_end=0.1, dt=0.02).save(dap3d.folder / "pen1.nc")
-
-
 def test_the_command_writes_a_page(dap3d, refuse, pen1):
     done = dap3d.succeed("view", "pen1.nc")
     assert "pen1.html written" in done.stdout

@@ -148,90 +148,78 @@ def test_the_place_in_the_array_is_the_number(read):
 # ---------------------------------------------------------------- elements
 
 JOINTS = {
-    "sph": ("iPindex = 1; J.jPindex = 2", {"P_i": "P1", "P_j": "P2"}),
+    "sph": ("iPindex = 1; E.jPindex = 2", {"P_i": "P1", "P_j": "P2"}),
     "rev": (
-        "iPindex = 1; J.jPindex = 2; J.iVindex_a = 1; J.jVindex_a = 2",
+        "iPindex = 1; E.jPindex = 2; E.iVindex_a = 1; E.jVindex_a = 2",
         {"P_i": "P1", "P_j": "P2", "a_i": "V1", "a_j": "V2"},
     ),
-    "sph-sph": ("V2index = 1; J.el = 2.5", {"d": "d1", "length": 2.5}),
-    "cyl": ("iVindex_a = 3; J.jVindex_a = 1; J.V2index = 1", {"a_i": "V3", "a_j": "V1", "d": "d1"}),
+    "sph-sph": ("V2index = 1; E.el = 2.5", {"d": "d1", "length": 2.5}),
+    "cyl": ("iVindex_a = 3; E.jVindex_a = 1; E.V2index = 1", {"a_i": "V3", "a_j": "V1", "d": "d1"}),
     "tran": (
-        "jVindex_a = 1; J.V2index = 1; J.Ac = [0 -1 0 1 0 0 0 0 1]",
+        "jVindex_a = 1; E.V2index = 1; E.Ac = [0 -1 0 1 0 0 0 0 1]",
         {"a_j": "V1", "d": "d1", "A_c": ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))},
     ),
     "univ": (
-        "iPindex = 1; J.jPindex = 2; J.iVindex_a = 1; J.jVindex_n = 2",
+        "iPindex = 1; E.jPindex = 2; E.iVindex_a = 1; E.jVindex_n = 2",
         {"P_i": "P1", "P_j": "P2", "a_i": "V1", "n_j": "V2"},
     ),
     "rel-rot": (
-        "iBindex = 2; J.jBindex = 1; J.jVindex_a = 1; J.iFunct = 1",
+        "iBindex = 2; E.jBindex = 1; E.jVindex_a = 1; E.iFunct = 1",
         {"body_i": "body2", "body_j": "body1", "a_j": "V1", "function": "f1"},
     ),
     "rel-tran": (
-        "iBindex = 2; J.jVindex_a = 2",
+        "iBindex = 2; E.jVindex_a = 2",
         {"body_i": "body2", "body_j": "ground", "a_j": "V2"},
     ),
     "rP": (
-        "iBindex = 2; J.jVindex_a = 2; J.el = 0.65; J.iFunct = 1",
+        "iBindex = 2; E.jVindex_a = 2; E.el = 0.65; E.iFunct = 1",
         {"body_i": "body2", "a_j": "V2", "length": 0.65, "function": "f1"},
     ),
     "fix": ("iBindex = 2", {"body_i": "body2"}),
     "disk": (
-        "disk = 'zn'; J.iBindex = 2; J.R = 0.2",
+        "disk = 'zn'; E.iBindex = 2; E.R = 0.2",
         {"body_i": "body2", "slip": "nz", "radius": 0.2},
     ),
 }
-
-
-def joint_of(word):
-    """The text of a file of one joint."""
-    return f"J = Joint_struct; J.type = '{word}'; J.{JOINTS[word][0]};\nJoints = [J];\n"
-
-
-@pytest.mark.parametrize("word", JOINTS)
-def test_joints(read, tmp_path, word):
-    """Numbers become names, fields those of the scene, which their types accept."""
-    scene, report = read(inJoints=joint_of(word))
-    assert scene.joints["J1"].type == word
-    assert scene.joints["J1"].fields == JOINTS[word][1]
-    assert report.unused == []
-    text = joint_of(word).replace("[0 -1 0 1 0 0 0 0 1]", "eye(3)")
-    scene, _ = dap.import_matlab(write(tmp_path / "again", inJoints=text))
-    assert scene.joints["J1"].type == word
-
-
 FORCES = {
     "ptp": (
-        "V2index = 1; S.k = 2; S.c = 3; S.el_0 = 4; S.f_a = 5",
+        "V2index = 1; E.k = 2; E.c = 3; E.el_0 = 4; E.f_a = 5",
         {"d": "d1", "k": 2.0, "c": 3.0, "l0": 4.0, "f_a": 5.0},
     ),
     "rot_sda": (
-        "iVindex = 3; S.jVindex = 1; S.kVindex = 1; S.k = 2; S.c = 3; S.theta_0 = pi/8; S.n_a = 5",
+        "iVindex = 3; E.jVindex = 1; E.kVindex = 1; E.k = 2; E.c = 3; E.theta_0 = pi/8; E.n_a = 5",
         {"v_i": "V3", "v_j": "V1", "axis": "V1", "k": 2.0, "c": 3.0, "theta_0": np.pi / 8}
         | {"n_a": 5.0},
     ),
-    "weight": ("gravity = 1.6; S.wgt = [0; -1; 0]", {"gravity": 1.6, "wgt": (0.0, -1.0, 0.0)}),
-    "fp": ("iBindex = 2; S.fp = [1; 2; 3]", {"body_i": "body2", "fp": (1.0, 2.0, 3.0)}),
-    "np": ("iBindex = 2; S.np = [1; 2; 3]", {"body_i": "body2", "np": (1.0, 2.0, 3.0)}),
-    "f": ("iPindex = 3; S.f = [1; 2; 3]", {"P_i": "P3", "f": (1.0, 2.0, 3.0)}),
-    "n": ("iBindex = 2; S.n = [1; 2; 3]", {"body_i": "body2", "n": (1.0, 2.0, 3.0)}),
+    "weight": ("gravity = 1.6; E.wgt = [0; -1; 0]", {"gravity": 1.6, "wgt": (0.0, -1.0, 0.0)}),
+    "fp": ("iBindex = 2; E.fp = [1; 2; 3]", {"body_i": "body2", "fp": (1.0, 2.0, 3.0)}),
+    "np": ("iBindex = 2; E.np = [1; 2; 3]", {"body_i": "body2", "np": (1.0, 2.0, 3.0)}),
+    "f": ("iPindex = 3; E.f = [1; 2; 3]", {"P_i": "P3", "f": (1.0, 2.0, 3.0)}),
+    "n": ("iBindex = 2; E.n = [1; 2; 3]", {"body_i": "body2", "n": (1.0, 2.0, 3.0)}),
 }
+ELEMENTS = {"Joint": JOINTS, "Force": FORCES}
 
 
-def force_of(word):
-    """The text of a file of one force."""
-    return f"S = Force_struct; S.type = '{word}'; S.{FORCES[word][0]};\nForces = [S];\n"
+def element_of(kind, word):
+    """The file of one joint or force, by its name: its text."""
+    given = ELEMENTS[kind][word][0]
+    return {f"in{kind}s": f"E = {kind}_struct; E.type = '{word}'; E.{given};\n{kind}s = [E];\n"}
 
 
-@pytest.mark.parametrize("word", FORCES)
-def test_forces(read, tmp_path, word):
-    """As joints; they are accepted by their types."""
-    scene, report = read(inForces=force_of(word))
-    assert scene.forces["F1"].type == word
-    assert scene.forces["F1"].fields == FORCES[word][1]
+@pytest.mark.parametrize(
+    ("kind", "word"), [(kind, word) for kind, words in ELEMENTS.items() for word in words]
+)
+def test_joints_and_forces(read, tmp_path, kind, word):
+    """Numbers become names, fields those of the scene, which their types accept."""
+    files = element_of(kind, word)
+    scene, report = read(**files)
+    element = scene.joints["J1"] if kind == "Joint" else scene.forces["F1"]
+    assert element.type == word
+    assert element.fields == ELEMENTS[kind][word][1]
     assert report.unused == []
-    scene, _ = dap.import_matlab(write(tmp_path / "again", inForces=force_of(word)))
-    assert scene.forces["F1"].type == word
+    files = {name: text.replace("[0 -1 0 1 0 0 0 0 1]", "eye(3)") for name, text in files.items()}
+    scene, _ = dap.import_matlab(write(tmp_path / "again", **files))
+    assert {**scene.joints, **scene.forces}[element.name].type == word
 
 
 FUNCTIONS = {
@@ -329,7 +317,7 @@ def test_friction_of_a_joint_becomes_a_force(read, mistakes):
 @pytest.mark.parametrize("word", ["sph", "rev", "cyl", "tran", "disk"])
 def test_friction_of_joints_is_accepted_by_its_type(tmp_path, word):
     given = JOINTS[word][0].replace("[0 -1 0 1 0 0 0 0 1]", "eye(3)")
-    line = f"J = Joint_struct; J.type = '{word}'; J.{given}; J.mu = 0.2;\nJoints = [J];\n"
+    line = f"E = Joint_struct; E.type = '{word}'; E.{given}; E.mu = 0.2;\nJoints = [E];\n"
     scene, _ = dap.import_matlab(write(tmp_path, inJoints=line))
     assert scene.forces["friction_J1"].fields["mu"] == 0.2
 

@@ -46,7 +46,7 @@ def read_actuators(reader: MjcfReader, inertia: JointInertia, keyframe: Keyframe
     for element, start in zip(elements, starts, strict=True):
         if element.number("group", 0.0) in disabled:
             text = "an actuator of a group that is disabled"
-            document.source.remarks.leave_out(element.place, text)
+            reader.remarks.leave_out(element.place, text)
         elif element.name != "plugin":
             acting.append((element, _targets(reader, element), start))
     reading = ActuatorReader(reader, inertia, [(e, targets) for e, targets, _ in acting])
@@ -56,7 +56,7 @@ def read_actuators(reader: MjcfReader, inertia: JointInertia, keyframe: Keyframe
 
 def _targets(reader: MjcfReader, element: XmlElement) -> list[tuple[str, float]]:
     """The joints that an actuator acts on, with the factors of its force."""
-    gear, joints = element.numbers("gear", None, (1.0,))[0], reader.model.joints
+    gear, joints = _gear(element), reader.model.joints
     name = element.get("joint") or element.get("jointinparent")
     targets = [] if name is None else [(name, gear)]
     if "tendon" in element.attributes:
@@ -100,15 +100,14 @@ class ActuatorReader:
         elif "site" in element.attributes:
             why = self._act_at_site(element, attrs.evolve(actuator, gear=law[0]), law)
         elif line is not None and (not targets or (len(targets) > 1 and any(law[1:]))):
-            gear, (gain, constant, position, rate) = element.numbers("gear", None, (1.0,))[0], law
-            ends = sorted(gear * bound for bound in actuator.force) if gear else (0.0, 0.0)
+            gear, (gain, constant, position, rate) = _gear(element), law
             if position > 0.0 or rate > 0.0:
                 why = "a servo of a tendon with dampratio, or that drives it away"
             else:
                 self.reader.model.actuators.append(attrs.evolve(
                     actuator, tendon=line, gear=gear * gain, bias=gear * constant,
                     stiffness=-gear * gear * position, damping=-gear * gear * rate,
-                    force=(ends[0], ends[1]),
+                    force=_scaled(actuator.force, gear) if gear else (0.0, 0.0),
                 ))  # fmt: skip
         elif not targets:
             why = "on this body, or a joint of several coordinates"
@@ -120,7 +119,7 @@ class ActuatorReader:
             self._note_bounds(element, line)
         else:
             text = f"an actuator <{element.name}>: {why}"
-            self.reader.document.source.remarks.leave_out(place, text, motion=True)
+            self.reader.remarks.leave_out(place, text, motion=True)
 
     def _note_bounds(self, element: XmlElement, line: Tendon | None) -> None:
         """Remark on bounds of joints that an actuator moves by a site or a tendon."""
@@ -130,7 +129,7 @@ class ActuatorReader:
         ranges = self.reader.force_ranges
         if any(ranges.get(name, UNBOUNDED) != UNBOUNDED for name in movers(self.reader, line)):
             text = "actuatorfrcrange of a joint that a site, a tendon or a muscle moves"
-            self.reader.document.source.remarks.leave_out(element.place, text, motion=True)
+            self.reader.remarks.leave_out(element.place, text, motion=True)
 
     def _line(self, element: XmlElement, targets: list[tuple[str, float]]) -> Tendon | None:
         """The line of the tendon, or of the joint of one coordinate, that an actuator acts on."""
@@ -144,17 +143,18 @@ class ActuatorReader:
         if line is None or {element.get("gaintype"), element.get("biastype")} != {"muscle"}:
             return "its law"
         low, high = self._length_range(element, line)
-        number = dict(zip(MUSCLE, _muscle_numbers(element), strict=True))
-        (at_low, at_high), (force,) = number["range"], number["force"]
+        at_low, at_high, *others = (*element.numbers("gainprm", None, (1.0,)), *[0.0] * 9)[:9]
+        number = dict(zip(list(MUSCLE)[1:], others, strict=True))
+        force = number["force"]
         if not low < high or not at_low < at_high:
             return "a muscle without lengthrange, of joints without limits: give lengthrange"
-        gear = element.numbers("gear", None, (1.0,))[0]
+        gear = _gear(element)
         if force < 0.0:  # the acceleration that it gives is
             arms = slopes(self.reader, line)
             moved = None if arms is None else self.inertia.acceleration_of(arms)
             if moved is None:
                 return "a muscle whose force is scaled by the mass matrix, which is not known"
-            force = number["scale"][0] / max(LEAST, abs(gear) * moved)
+            force = number["scale"] / max(LEAST, abs(gear) * moved)
         times = (*element.numbers("dynprm", None, (1.0,)), 0.0, 0.0)[:3]
         optimum = (high - low) / (at_high - at_low)
         if not gear or not min(times[:2]) > 0.0:
@@ -164,13 +164,12 @@ class ActuatorReader:
             "optimum": optimum / gear,
             "sinew": (low - at_low * optimum) / gear,
         }
-        muscle |= dict(zip(("l_min", "l_max", "v_max", "fp_max", "fv_max"),
-                           (number[k][0] for k in ("lmin", "lmax", "vmax", "fpmax", "fvmax")),
-                           strict=True))  # fmt: skip
+        for key in ("l_min", "l_max", "v_max", "fp_max", "fv_max"):
+            muscle[key] = number[key.replace("_", "")]
         muscle |= dict(zip(("time_up", "time_down", "smoothing"), times, strict=True))
-        ends = sorted(gear * bound for bound in actuator.force)
+        force_bounds = _scaled(actuator.force, gear)
         self.reader.model.actuators.append(
-            attrs.evolve(actuator, tendon=line, muscle=muscle, force=(ends[0], ends[1]))
+            attrs.evolve(actuator, tendon=line, muscle=muscle, force=force_bounds)
         )
         return ""
 
@@ -179,9 +178,7 @@ class ActuatorReader:
         if "lengthrange" in element.attributes:
             low, high = element.numbers("lengthrange", 2)
             return low, high
-        gear, ends = element.numbers("gear", None, (1.0,))[0], length_range(self.reader, line)
-        low, high = sorted(gear * end for end in ends)
-        return low, high
+        return _scaled(length_range(self.reader, line), _gear(element))
 
     def _name(self, element: XmlElement) -> str:
         names = {one.name for one in self.reader.model.actuators}
@@ -189,7 +186,7 @@ class ActuatorReader:
 
     def _act_in_joint(self, element: XmlElement, actuator: Actuator, law: Any) -> None:
         """Add an actuator of a joint, whose ``gear`` is that of the transmission."""
-        remarks, (gain, constant, position, rate) = self.reader.document.source.remarks, law
+        remarks, (gain, constant, position, rate) = self.reader.remarks, law
         target, gear = self.reader.model.joints[actuator.joint], actuator.gear
         if rate > 0.0 and gain == -position:
             moved = self.inertia.of(actuator.joint)
@@ -197,8 +194,8 @@ class ActuatorReader:
                 text = "dampratio: links without mass, or too many, for a mass matrix"
                 remarks.leave_out(element.place, text, motion=True)
             rate *= -_critical(gain, gear, moved or 0.0)
-        ends = sorted(gear * bound for bound in actuator.force) if gear else (0.0, 0.0)
-        force = self._within_joint(element, actuator.joint, (ends[0], ends[1]))
+        force = _scaled(actuator.force, gear) if gear else (0.0, 0.0)
+        force = self._within_joint(element, actuator.joint, force)
         bias = gear * constant + gear * gear * position * target.reference
         stiffness, damping = -gear * gear * position, -gear * gear * rate
         whole = force == UNBOUNDED and not actuator.activation
@@ -219,7 +216,7 @@ class ActuatorReader:
         count = Counter(name for _, targets in self.elements for name, _ in targets)[joint]
         if given != UNBOUNDED and count > 1:
             text = "actuatorfrcrange of a joint with several actuators"
-            self.reader.document.source.remarks.leave_out(element.place, text, motion=True)
+            self.reader.remarks.leave_out(element.place, text, motion=True)
             return force
         low, high = np.clip(force, *given).tolist()
         return low, high
@@ -266,17 +263,21 @@ class ActuatorReader:
         if kind not in ("integrator", "filter", "filterexact"):
             return None
         time = element.numbers("dynprm", None, (1.0,))[0]
+        active = {"active": self._range(element, "act")}
         if kind == "integrator":
-            found: dict[str, Any] = {"activation": "integral"}
-        else:
-            found = {"activation": "lag", "time": time}
-        return found | {"active": self._range(element, "act")}
+            return {"activation": "integral"} | active
+        return {"activation": "lag", "time": time} | active
 
 
-def _muscle_numbers(element: XmlElement) -> list[tuple[float, ...]]:
-    """Those of MUSCLE."""
-    low, high, *others = (*element.numbers("gainprm", None, (1.0,)), *[0.0] * 9)[:9]
-    return [(low, high), *((x,) for x in others)]
+def _gear(element: XmlElement) -> float:
+    """The first number of the gear of an actuator."""
+    return element.numbers("gear", None, (1.0,))[0]
+
+
+def _scaled(bounds: Bounds, gear: float) -> Bounds:
+    """Bounds, times a gear."""
+    low, high = sorted(gear * bound for bound in bounds)
+    return low, high
 
 
 def _critical(kp: float, gear: float, inertia: float) -> float:

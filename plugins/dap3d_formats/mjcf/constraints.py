@@ -30,19 +30,19 @@ def read_equalities(reader: MjcfReader) -> None:
     Raises:
         FormatError: one names something that is not there.
     """
-    remarks, document = reader.document.source.remarks, reader.document
-    holders = document.root.all("equality")
-    for holder in () if document.disables("equality", "constraint") else holders:
-        for given in holder:
-            element = document.settled_equality(given)
-            if element.get("active", "true") == "false":
-                remarks.leave_out(element.place, "equalities that are not active")
-            elif element.name in ("connect", "weld"):
-                _close(reader, element)
-            elif element.name == "joint":
-                _couple(reader, element)
-            elif element.name == "tendon":
-                _couple_by_tendon(reader, element)
+    remarks, document = reader.remarks, reader.document
+    if document.disables("equality", "constraint"):
+        return
+    for given in document.section("equality"):
+        element = document.settled_equality(given)
+        if element.get("active", "true") == "false":
+            remarks.leave_out(element.place, "equalities that are not active")
+        elif element.name in ("connect", "weld"):
+            _close(reader, element)
+        elif element.name == "joint":
+            _couple(reader, element)
+        elif element.name == "tendon":
+            _couple_by_tendon(reader, element)
 
 
 def _link(reader: MjcfReader, element: XmlElement, key: str) -> str:
@@ -69,7 +69,7 @@ def _close(reader: MjcfReader, element: XmlElement) -> None:
             in_parent, in_child = _weld(reader, element, parent, child)
     if "solref" in element.attributes or "solimp" in element.attributes:
         text = "softness of an equality (solref, solimp): it holds exactly"
-        reader.document.source.remarks.translate(element.place, text, motion=True)
+        reader.remarks.translate(element.place, text, motion=True)
     model.joints[name] = Joint(name, kind, parent, child, in_parent, in_child, closes=True,
                                place=element.place)  # fmt: skip
 
@@ -122,7 +122,7 @@ def _imply_limits(reader: MjcfReader, coupling: Coupling) -> None:
         ends, slack = np.polynomial.polynomial.polyval(q, coupling.curve), own.upper - own.lower
         if (abs(ends - 0.5 * (own.lower + own.upper)) <= (0.5 + IMPLIED) * slack).all():
             text = "limits of a joint that follows another, which that one's imply: left to it"
-            reader.document.source.remarks.translate(coupling.place, text)
+            reader.remarks.translate(coupling.place, text)
             joints[coupling.joint].limits = (Limits(),)
 
 
@@ -131,7 +131,7 @@ def _couple_by_tendon(reader: MjcfReader, element: XmlElement) -> None:
 
     L_0 is the length where the file draws it. Of fixed tendons this is a sum of coordinates.
     """
-    remarks, place = reader.document.source.remarks, element.place
+    remarks, place = reader.remarks, element.place
     keys = [key for key in ("tendon1", "tendon2") if key in element.attributes]
     lines = [line_of(reader, tendon_of(reader, element, key), element.require(key))
              for key in keys or ("tendon1",)]  # fmt: skip
@@ -159,7 +159,7 @@ def _hold_sum(
     reader: MjcfReader, element: XmlElement, name: str, factors: dict[str, float], a0: float
 ) -> None:
     """A sum of coordinates stays a0: of one joint, of two that are coupled, of more."""
-    model, remarks = reader.model, reader.document.source.remarks
+    model, remarks = reader.model, reader.remarks
     if not factors:
         text = "an equality of tendons that are the same, or have coefficients of 0"
         remarks.leave_out(element.place, text, motion=bool(a0))

@@ -24,17 +24,16 @@ def read_contacts(reader: MjcfReader) -> None:
         FormatError: one names a body that is not there.
     """
     document, model = reader.document, reader.model
-    for holder in document.root.all("contact"):
-        for element in holder.all("exclude"):
-            ends = element.require("body1"), element.require("body2")
-            for name in ends:
-                if name not in (*model.links, WORLD) and document.source.contacts:
-                    raise FormatError(f"there is no body {name}", element.place)
-            if reader.ground in model.links or WORLD not in ends:
-                one, other = (reader.ground if name == WORLD else name for name in ends)
-                model.excluded.append((one, other))
+    for element in document.section("contact", "exclude"):
+        ends = element.require("body1"), element.require("body2")
+        for name in ends:
+            if name not in (*model.links, WORLD) and document.source.contacts:
+                raise FormatError(f"there is no body {name}", element.place)
+        if reader.ground in model.links or WORLD not in ends:
+            one, other = (reader.ground if name == WORLD else name for name in ends)
+            model.excluded.append((one, other))
     if document.source.contacts and not document.disables("contact", "constraint"):
-        pairs = [p for holder in document.root.all("contact") for p in holder.all("pair")]
+        pairs = document.section("contact", "pair")
         _meet(reader, [slots for p in pairs if (slots := _pair(reader, p)) is not None])
 
 
@@ -54,7 +53,7 @@ def _pair(reader: MjcfReader, given: XmlElement) -> tuple[Slot, Slot] | None:
     elif _joined(reader, *(slots[name][0] for name in names)):
         text = "a pair of geoms of one body, or of two that joints hold together"
     if text:
-        document.source.remarks.leave_out(element.place, text, motion=True)
+        reader.remarks.leave_out(element.place, text, motion=True)
         return None
     both = [_shape(reader, slots[name]).contact for name in names]
     one, other = (contact for contact in both if contact is not None)
@@ -67,7 +66,7 @@ def _pair(reader: MjcfReader, given: XmlElement) -> tuple[Slot, Slot] | None:
     mu, across, spin, roll, around = friction + usual[len(friction) :]
     if directions >= 3 and (across != mu or (directions >= 6 and around != roll)):
         text = "friction of a pair that differs along its directions: the first holds"
-        document.source.remarks.translate(element.place, text, motion=True)
+        reader.remarks.translate(element.place, text, motion=True)
     found = {"mu": mu, "mu_spin": spin, "mu_roll": roll}
     found |= {name: 0.0 for name, least in FRICTION_DIRECTIONS.items() if directions < least}
     model.friction[frozenset(names)] = found
@@ -103,7 +102,7 @@ def _meet(reader: MjcfReader, pairs: list[tuple[Slot, Slot]]) -> None:
         hub = Counter(slot for pair in pairs for slot in pair).most_common(1)[0][0]
         if not free:
             text = "pairs of geoms: bits for 32 groups are taken"
-            reader.document.source.remarks.leave_out(model.place, text, motion=True)
+            reader.remarks.leave_out(model.place, text, motion=True)
             return
         bit = free.pop()
         others = {slot for pair in pairs if hub in pair for slot in pair} - {hub}

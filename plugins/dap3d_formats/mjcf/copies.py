@@ -104,7 +104,7 @@ class _Copier:
         """
         source, folder = self.document.source, self.document.settings[""].folder
         name, models = element.require("model"), {}
-        for model in (m for asset in self.document.root.all("asset") for m in asset.all("model")):
+        for model in self.document.section("asset", "model"):
             file, place = model.require("file"), model.place
             own = model.get("name") or source.include(file, place, folder).get("model") or ""
             models[own] = (file, place)
@@ -185,7 +185,7 @@ def _part(model: Document, element: XmlElement) -> tuple[list[XmlElement], list[
         raise FormatError("<attach> takes body or frame, not both", place)
     if not tags:
         sections = [one for one in root if one.name in (*NAMING, "keyframe")]
-        return [child for world in worlds for child in world], [*assets, *sections]
+        return model.section("worldbody"), [*assets, *sections]
     (tag,), name = tags, element.get(tags[0])
     found = {one.get("name"): one for world in worlds for one in _below(world, tag, "main")}
     if name not in found:

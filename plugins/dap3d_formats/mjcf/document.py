@@ -22,7 +22,7 @@ from dap3d_core.interface.formats import (
     euler_angles,
     from_quaternion,
 )
-from dap3d_formats.axes import along, unit
+from dap3d_formats.axes import along, cross, unit
 
 #: Elements that share the defaults of actuators.
 ACTUATORS = (
@@ -114,6 +114,10 @@ class Document:
                 asset.attributes.setdefault("name", Path(asset.attributes["file"]).stem)
         return cls(source, root, {"": Settings.of(root, folder)})
 
+    def section(self, tag: str, name: str = "") -> list[XmlElement]:
+        """The elements of all sections of a tag, or those of one name alone."""
+        return [one for holder in self.root.all(tag) for one in holder if name in ("", one.name)]
+
     def settled(self, element: XmlElement, childclass: str) -> XmlElement:
         """An element with the attributes of its class.
 
@@ -163,7 +167,7 @@ class Document:
 
     def disables(self, *names: str) -> bool:
         """True if a flag of one of these names is off."""
-        flags = [flag for option in self.root.all("option") for flag in option.all("flag")]
+        flags = self.section("option", "flag")
         return any(flag.get(name) == "disable" for flag in flags for name in names)
 
     def bounds(self, element: XmlElement, key: str, limited: str) -> tuple[float, float]:
@@ -236,11 +240,6 @@ def _xyaxes(element: XmlElement) -> Any:
     y = unit(tuple(b - dot * a for a, b in zip(x, numbers[3:], strict=True)), element)
     z = cross(x, y)
     return [[x[k], y[k], z[k]] for k in range(3)]
-
-
-def cross(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, float, float]:
-    """The cross product."""
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 def _kind(tag: str) -> str:

@@ -36,11 +36,10 @@ _TENDON = (
 )  # fmt: skip
 
 MJCF: Table = {
-    "mujoco": taken() | taken("model"),
+    "mujoco": taken("model"),
     "mujocoinclude": taken(),
-    "include": taken() | taken("file"),
-    "compiler": taken()
-    | taken(
+    "include": taken("file"),
+    "compiler": taken(
         "angle eulerseq autolimits inertiafromgeom inertiagrouprange meshdir assetdir strippath "
         "boundmass boundinertia balanceinertia settotalmass coordinate"
     )
@@ -50,7 +49,7 @@ MJCF: Table = {
         "no effect here",
     ),
     "lengthrange": noted("", "muscles"),
-    "option": taken() | taken("gravity actuatorgroupdisable")
+    "option": taken("gravity actuatorgroupdisable")
     | moves("wind density viscosity magnetic", "fluids and fields")
     | noted(
         "timestep impratio tolerance ls_tolerance noslip_tolerance ccd_tolerance sleep_tolerance "
@@ -59,8 +58,7 @@ MJCF: Table = {
         "apirate mpr_iterations mpr_tolerance collision",
         _SOLVER,
     ),
-    "flag": taken()
-    | taken("gravity constraint equality frictionloss limit contact clampctrl")
+    "flag": taken("gravity constraint equality frictionloss limit contact clampctrl")
     | noted(
         "warmstart refsafe sensor midphase eulerdamp autoreset nativeccd island energy fwdinv "
         "invdiscrete multiccd sleep diagexact ipc speculative",
@@ -70,43 +68,44 @@ MJCF: Table = {
     "size": noted("", "memory of a simulator"),
     "visual": noted("", _DRAWING),
     "statistic": noted("", _DRAWING),
-    "default": taken() | taken("class"),
+    "default": taken("class"),
     "custom": noted("", "data of a user"),
     "extension": noted("", "plugins of a simulator are not run"),
     "asset": taken(),
-    "mesh": taken() | taken("name class file scale refpos refquat inertia")
+    "mesh": taken("name class file scale refpos refquat inertia")
     | translated("vertex face", "its mass properties count; it is not drawn")
     | noted("normal texcoord builtin params", "meshes without a file are not drawn")
     | noted("content_type smoothnormal maxhullvert material octree_maxdepth", _DRAWING),
-    "material": taken() | taken("name class rgba")
+    "material": taken("name class rgba")
     | noted(
         "texture texrepeat texuniform emission specular shininess reflectance metallic roughness",
         "textures are not drawn",
     ),
     "layer": noted("", "textures are not drawn"),
     "texture": noted("", "textures are not drawn"),
-    "hfield": taken() | taken("name file nrow ncol size elevation")
+    "hfield": taken("name file nrow ncol size elevation")
     | noted("content_type", _DRAWING),
     "skin": noted("", "skins are not drawn"),
-    "model": taken() | taken("name file") | noted("content_type", "it is MJCF"),
+    "model": taken("name file") | noted("content_type", "it is MJCF"),
     "worldbody": taken(),
-    "body": taken() | _FRAME | taken("name childclass")
+    "body": _FRAME | taken("name childclass")
     | translated("mocap", "a part of ground, at its pose or that of the keyframe")
     | taken("gravcomp")
     | noted("user sleep fuse simple", "data of a simulator"),
-    "frame": taken() | _FRAME | taken("name childclass"),
-    "inertial": taken() | _FRAME | taken("mass diaginertia fullinertia"),
-    "joint": taken()
-    | taken("name class type pos axis range limited ref springref stiffness damping armature")
+    "frame": _FRAME | taken("name childclass"),
+    "inertial": _FRAME | taken("mass diaginertia fullinertia"),
+    "joint": taken(
+        "name class type pos axis range limited ref springref stiffness damping armature "
+        "actuatorfrcrange actuatorfrclimited"
+    )
     | translated("frictionloss", "it sticks; with method joint it fades at low rates")
     | translated("springdamper", "stiffness and damping, by the mass matrix where the model starts")
     | moves("springyield", "springs do not yield")
     | moves("solreflimit solimplimit solreffriction solimpfriction margin", _SOFT)
-    | taken("actuatorfrcrange actuatorfrclimited")
     | translated("actuatorgravcomp", "gravcomp is no part of what actuatorfrcrange bounds")
     | noted("group user align", _DRAWING),
-    "freejoint": taken() | taken("name") | noted("group align", _DRAWING),
-    "geom": taken() | _FRAME
+    "freejoint": taken("name") | noted("group align", _DRAWING),
+    "geom": _FRAME
     | taken("name class type size fromto mesh mass density group rgba material")
     | taken("hfield") | noted("shellinertia fitscale", "not drawn")
     | moves("fluidshape fluidcoef", "fluids")
@@ -116,24 +115,24 @@ MJCF: Table = {
     )
     | noted("user castshadow", _DRAWING)
     | moves("adhesion surfacevel", _CONTACT),
-    "site": taken() | _FRAME | taken("name class fromto")
+    "site": _FRAME | taken("name class fromto")
     | noted("type size group material rgba user mesh", _DRAWING),
     "camera": noted("", _DRAWING),
     "light": noted("", _DRAWING),
     "plugin": noted("", "plugins of a simulator are not run"),
     "composite": refused("", "composites are not expanded; save the compiled model in MuJoCo"),
     "flexcomp": refused("", "deformable bodies"),
-    "replicate": taken() | taken("count sep offset euler"),
-    "attach": taken() | taken("model body frame prefix"),
+    "replicate": taken("count sep offset euler"),
+    "attach": taken("model body frame prefix"),
     "deformable": moves("", "deformable bodies"),
     "contact": moves("", _CONTACT),
     "pair": moves("", _CONTACT),
-    "equality": taken() | _EQUALITY,
-    "connect": taken() | _EQUALITY | taken("body1 body2 anchor site1 site2"),
-    "weld": taken() | _EQUALITY | taken("body1 body2 relpose anchor site1 site2")
+    "equality": _EQUALITY,
+    "connect": _EQUALITY | taken("body1 body2 anchor site1 site2"),
+    "weld": _EQUALITY | taken("body1 body2 relpose anchor site1 site2")
     | moves("torquescale", _SOFT),
-    "equality/joint": taken() | _EQUALITY | taken("joint1 joint2 polycoef"),
-    "equality/tendon": taken() | _EQUALITY | taken("tendon1 tendon2 polycoef"),
+    "equality/joint": _EQUALITY | taken("joint1 joint2 polycoef"),
+    "equality/tendon": _EQUALITY | taken("tendon1 tendon2 polycoef"),
     "flex": moves("", "deformable bodies"),
     "flexstrain": noted("", "deformable bodies"),
     "flexvert": noted("", "deformable bodies"),
@@ -144,15 +143,15 @@ MJCF: Table = {
         "solreflimit solimplimit solreffriction solimpfriction", "of tendons",
     ) | taken("class limited range stiffness damping springlength armature group width material "
               "rgba user"),
-    "fixed": taken() | _TENDON,
-    "fixed/joint": taken() | taken("joint coef"),
-    "spatial": taken() | _TENDON,
-    "spatial/site": taken() | taken("site"),
-    "spatial/geom": taken() | taken("geom sidesite"), "pulley": taken() | taken("divisor"),
+    "fixed": _TENDON,
+    "fixed/joint": taken("joint coef"),
+    "spatial": _TENDON,
+    "spatial/site": taken("site"),
+    "spatial/geom": taken("geom sidesite"), "pulley": taken("divisor"),
     "actuator": taken(),
     **dict.fromkeys(
         ("motor", "general", "position", "velocity", "intvelocity", "cylinder", "muscle"),
-        taken() | _ACTUATOR,
+        _ACTUATOR,
     ),
     **dict.fromkeys(
         ("damper", "adhesion", "dcmotor", "orientation", "pid"),
@@ -173,7 +172,7 @@ CONTACTS: Table = {
     | taken("condim")
     | moves("solmix solref solimp margin gap", "contacts are rigid"),
     "contact": taken(),
-    "exclude": taken() | taken("name body1 body2"),
-    "pair": taken() | taken("name class geom1 geom2 condim friction")
+    "exclude": taken("name body1 body2"),
+    "pair": taken("name class geom1 geom2 condim friction")
     | moves("solref solimp solreffriction margin gap", "contacts are rigid"),
 }  # fmt: skip

@@ -22,6 +22,7 @@ from dap3d_core.interface.formats import (
     Remarks,
     quaternion,
 )
+from dap3d_formats.shapes import rgba
 from dap3d_formats.unwritten import leave_out_forces
 from dap3d_formats.xml_text import XmlText, words
 
@@ -206,8 +207,7 @@ class _Writer:
         else:
             attributes["size"] = words(size)
         if geometry.color:
-            rgb = (int(geometry.color[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
-            attributes["rgba"] = words([*rgb, 1.0])
+            attributes["rgba"] = words(rgba(geometry.color))
         self.text.empty("geom", **attributes)
 
     def _actuator(self, one: Actuator) -> None:

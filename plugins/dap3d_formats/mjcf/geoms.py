@@ -11,6 +11,7 @@ from dap3d_core.interface.formats import (
     Frame,
     Geometry,
     Inertial,
+    Remarks,
     XmlElement,
     from_quaternion,
     inertia_moved,
@@ -20,6 +21,7 @@ from dap3d_core.interface.formats import (
 from dap3d_formats.axes import along
 from dap3d_formats.element_table import NO_CONTACTS
 from dap3d_formats.mjcf.document import Document
+from dap3d_formats.shapes import hexadecimal
 
 #: Friction of sliding, spinning and rolling.
 FRICTION = (1.0, 0.005, 0.0001)
@@ -51,10 +53,15 @@ class Geoms:
     colors: dict[str, str] = attrs.Factory(dict)
     paired: set[str] = attrs.Factory(set)
 
+    @property
+    def remarks(self) -> Remarks:
+        """Remarks on the file."""
+        return self.document.source.remarks
+
     @classmethod
     def of(cls, document: Document) -> "Geoms":
         """The reader, with the assets of the document."""
-        pairs = [pair for one in document.root.all("contact") for pair in one.all("pair")]
+        pairs = document.section("contact", "pair")
         geoms = cls(document, paired={p.get(k) or "" for p in pairs for k in ("geom1", "geom2")})
         for asset in document.root.all("asset"):
             for mesh in asset.all("mesh"):
@@ -63,7 +70,9 @@ class Geoms:
             for material in asset.all("material"):
                 settled = document.settled(material, "main")
                 if "rgba" in settled.attributes:
-                    geoms.colors[material.require("name")] = hexadecimal(settled.numbers("rgba"))
+                    geoms.colors[material.require("name")] = hexadecimal(
+                        settled.numbers("rgba")[:3]
+                    )
         return geoms
 
     def geometry(self, geom: XmlElement, frame: Frame) -> Geometry | None:
@@ -74,7 +83,7 @@ class Geoms:
             frame: the frame that it is given in, in its link.
         """
         kind = self.kind(geom)
-        color = hexadecimal(geom.numbers("rgba")) if "rgba" in geom.attributes else ""
+        color = hexadecimal(geom.numbers("rgba")[:3]) if "rgba" in geom.attributes else ""
         color = color or self.colors.get(geom.get("material") or "", "")
         hidden = geom.number("group", 0.0) >= HIDDEN
         common: dict[str, Any] = {"color": color, "collision": hidden, "place": geom.place}
@@ -88,7 +97,7 @@ class Geoms:
         if kind in FLAT:
             meets = common["contact"] is not None
             text = f"a geom {kind} is not drawn{', and meets no others' if meets else ''}"
-            self.document.source.remarks.leave_out(geom.place, text, motion=meets)
+            self.remarks.leave_out(geom.place, text, motion=meets)
             return None
         size, pose = self.solid(geom, kind)
         return Geometry(kind, size, frame @ pose, **common)
@@ -101,7 +110,7 @@ class Geoms:
         if not (any(bits) or surface) or self.document.disables("contact", "constraint"):
             return None
         if not self.document.source.contacts:
-            self.document.source.remarks.translate(geom.place, NO_CONTACTS, motion=True)
+            self.remarks.translate(geom.place, NO_CONTACTS, motion=True)
             return None
         given = geom.numbers("friction", None, FRICTION)
         mu, spin, roll = given + FRICTION[len(given) :]
@@ -109,11 +118,10 @@ class Geoms:
         return Contact(mu, spin, roll, directions, bits[0], bits[1], priority, surface=surface)
 
     def _mesh_shape(self, geom: XmlElement, frame: Frame, common: Any) -> Geometry | None:
-        asset = self._asset(geom)
+        asset, meets = self._asset(geom), common["contact"] is not None
         if "file" not in asset.attributes:
-            meets = common["contact"] is not None
             text = f"meshes without a file are not drawn{', and meet no others' if meets else ''}"
-            self.document.source.remarks.leave_out(geom.place, text, motion=meets)
+            self.remarks.leave_out(geom.place, text, motion=meets)
             return None
         path = self.document.locate(asset)
         if path is None:
@@ -123,10 +131,9 @@ class Geoms:
         along_axes = np.abs(inner.A).argmax(axis=0)
         skew = np.abs(np.abs(inner.A) - np.eye(3)[:, along_axes]).max()
         if len(set(scale)) > 1 and skew > SKEW:
-            meets = common["contact"] is not None
             text = "refquat of <mesh> that is no quarter turn, with a scale of unlike factors: "
             text += f"not drawn{', and meets no others' if meets else ''}"
-            self.document.source.remarks.leave_out(geom.place, text, motion=meets)
+            self.remarks.leave_out(geom.place, text, motion=meets)
             return None
         scale = tuple(scale[k] for k in along_axes)  # it is scaled before it is turned
         pose = frame @ self.document.frame(geom) @ inner
@@ -237,7 +244,12 @@ class Geoms:
         if not given or "builtin" in asset.attributes or rule not in ("legacy", "exact"):
             what = f"the inertia of mesh {asset.get('name')} is not computed here"
             raise FormatError(what, geom.place, "give its body an <inertial>")
-        vertices, triangles = self._read(asset) if "file" in given else _inline(asset)
+        if "file" in given:
+            path = self.document.locate(asset, required=True)
+            assert path is not None
+            vertices, triangles = self.document.source.mesh(path, asset.place)
+        else:
+            vertices, triangles = _inline(asset)
         reference = _reference(asset).inverse()
         vertices = vertices @ reference.A.T + reference.r
         vertices = vertices * np.array(asset.numbers("scale", 3, (1.0, 1.0, 1.0)))
@@ -245,11 +257,6 @@ class Geoms:
             return inertia_of_mesh(vertices, triangles, all_positive=rule == "legacy")
         except ValueError as error:
             raise FormatError(f"mesh {geom.get('mesh')}: {error}", geom.place) from None
-
-    def _read(self, asset: XmlElement) -> tuple[Any, Any]:
-        path = self.document.locate(asset, required=True)
-        assert path is not None
-        return self.document.source.mesh(path, asset.place)
 
 
 def _inline(asset: XmlElement) -> tuple[Any, Any]:
@@ -297,8 +304,3 @@ def _reference(asset: XmlElement) -> Frame:
     """The frame of a mesh in its file, before it is scaled."""
     q = asset.numbers("refquat", 4, (1.0, 0.0, 0.0, 0.0))
     return Frame(asset.numbers("refpos", 3, (0.0, 0.0, 0.0)), from_quaternion(q))
-
-
-def hexadecimal(rgba: tuple[float, ...]) -> str:
-    """A colour as #rrggbb."""
-    return "#" + "".join(f"{round(255 * min(max(x, 0.0), 1.0)):02x}" for x in rgba[:3])

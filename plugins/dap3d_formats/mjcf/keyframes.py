@@ -42,7 +42,7 @@ class Keyframe:
         document, joints = reader.document, reader.model.joints
         kinds = {name: joint.kind for name, joint in joints.items() if joint.kind != "fixed"}
         wanted, document.source.key = document.source.key, None
-        keys = [key for holder in document.root.all("keyframe") for key in holder.all("key")]
+        keys = document.section("keyframe", "key")
         named = {key.get("name") or str(k): key for k, key in enumerate(keys)}
         if wanted is not None and wanted not in named:
             known = f"it has {', '.join(named)}" if named else "it has none"
@@ -111,9 +111,8 @@ class Keyframe:
 
 def actuators_of(document: Document) -> list[XmlElement]:
     """All actuators, with the attributes of their classes."""
-    holders = document.root.all("actuator")
-    return [document.settled(one, "main") for holder in holders for one in holder
-            if one.name in ACTUATORS]  # fmt: skip
+    actuators = [one for one in document.section("actuator") if one.name in ACTUATORS]
+    return [document.settled(one, "main") for one in actuators]
 
 
 def keys_of_part(model: Document, part: XmlElement, acting: list[XmlElement]) -> list[XmlElement]:
@@ -123,12 +122,12 @@ def keys_of_part(model: Document, part: XmlElement, acting: list[XmlElement]) ->
         FormatError: one has more numbers, or fewer where no model is attached to it.
     """
     root, document = model.root, XmlElement("body", {}, model.root.place)
-    document.children = [child for world in root.all("worldbody") for child in world]
+    document.children = model.section("worldbody")
     held = list(_held(model, document, part, "main", within=False))
     joints = [(SIZES.get(kind, (1, 1)), at, inside) for kind, at, inside in held if kind != "mocap"]
     mocap = [(at, inside) for kind, at, inside in held if kind == "mocap"]
-    motors = [(one, any(one is other for other in acting)) for holder in root.all("actuator")
-              for one in holder if one.name in ACTUATORS]  # fmt: skip
+    motors = [(one, any(one is other for other in acting)) for one in model.section("actuator")
+              if one.name in ACTUATORS]  # fmt: skip
     states = [(one, kept) for one, kept in motors
               if model.settled(one, "main").get("dyntype") != "none"]  # fmt: skip
     parts = {key: [(size[k], at, inside) for size, at, inside in joints]

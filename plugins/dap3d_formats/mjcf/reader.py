@@ -20,6 +20,7 @@ from dap3d_core.interface.formats import (
     JointInertia,
     Limits,
     Link,
+    Remarks,
     XmlElement,
     balanced_inertia,
     quaternion,
@@ -71,6 +72,11 @@ class MjcfReader:
         self.geoms = Geoms.of(self.document)
         self.given = set(_names(root))
 
+    @property
+    def remarks(self) -> Remarks:
+        """Remarks on the file."""
+        return self.document.source.remarks
+
     def read_bodies(self) -> None:
         """Read bodies and their joints.
 
@@ -92,15 +98,23 @@ class MjcfReader:
 
     def _world_shapes(self, world: XmlElement) -> str:
         """The geoms of the world, as a link that is fixed to it; its name."""
-        geoms = self._gathered(world, ("geom",), Frame(), "main")
-        shapes = [self.geoms.geometry(geom, frame) for geom, frame in geoms]
         link = Link(self._free_link("world_shapes"), place=world.place)
-        link.geometries += [shape for shape in shapes if shape is not None]
+        link.geometries += self._shapes(self._gathered(world, ("geom",), Frame(), "main"))
         if link.geometries:
-            name = self._free(f"{link.name}_fixed")
-            self.model.links[link.name] = link
-            self.model.joints[name] = Joint(name, "fixed", WORLD, link.name, place=world.place)
+            self._fix(link, WORLD)
         return link.name
+
+    def _fix(self, link: Link, parent: str, in_parent: Frame | None = None) -> None:
+        """Add a link that is fixed to another."""
+        name = self._free(f"{link.name}_fixed")
+        self.model.links[link.name] = link
+        self.model.joints[name] = Joint(
+            name, "fixed", parent, link.name, in_parent or Frame(), place=link.place
+        )
+
+    def _shapes(self, geoms: list[tuple[XmlElement, Frame]]) -> list[Geometry]:
+        shapes = [self.geoms.geometry(geom, frame) for geom, frame in geoms]
+        return [shape for shape in shapes if shape is not None]
 
     def _contents(self, holder: XmlElement, link: str, frame: Frame, childclass: str) -> None:
         """Bodies and sites in a body or frame."""
@@ -111,9 +125,9 @@ class MjcfReader:
                 inner = child.get("childclass") or childclass
                 self._contents(child, link, frame @ self.document.frame(child), inner)
             elif child.name == "site":
-                settled = self.document.settled(child, childclass)
+                site = self.document.settled(child, childclass)
                 if child.get("name"):
-                    self.sites[child.require("name")] = (link, frame @ self._site(settled))
+                    self.sites[child.require("name")] = (link, frame @ self._site(site))
 
     def site(self, element: XmlElement, key: str) -> tuple[str, Frame]:
         """The link of a site that an element names, and its frame there.
@@ -158,10 +172,7 @@ class MjcfReader:
         here = frame @ document.frame(element)
         joints = self._gathered(element, ("joint", "freejoint"), Frame(), childclass)
         geoms = self._gathered(element, ("geom",), Frame(), childclass)
-        for geom, in_link in geoms:
-            shape = self.geoms.geometry(geom, in_link)
-            if shape is not None:
-                link.geometries.append(shape)
+        link.geometries += self._shapes(geoms)
         link.inertial = self._inertial(element, geoms)
         self._join(element, link, parent, here, joints)
         self._contents(element, name, Frame(), childclass)
@@ -208,9 +219,7 @@ class MjcfReader:
         """The joints of a body, in their order, with links without mass between them."""
         model, place = self.model, body.place
         if not joints:
-            name = self._free(f"{link.name}_fixed")
-            model.links[link.name] = link
-            model.joints[name] = Joint(name, "fixed", parent, link.name, here, place=place)
+            self._fix(link, parent, here)
             return
         start, last = here, parent
         made = [self._joint(element, frame) for element, frame in joints]
@@ -230,7 +239,7 @@ class MjcfReader:
             start, last = Frame(), below
         if len(made) > 1:
             text = "several joints of a body are joints in a row, with links between them"
-            self.document.source.remarks.translate(place, text)
+            self.remarks.translate(place, text)
 
     def _free(self, name: str) -> str:
         while name in self.model.joints or name in self.joints or name in self.given:
@@ -280,7 +289,7 @@ class MjcfReader:
             setattr(joint, key, (first,))
             if any(others):
                 text = f"{attribute} of a joint: higher coefficients of its polynomial"
-                self.document.source.remarks.leave_out(element.place, text, motion=True)
+                self.remarks.leave_out(element.place, text, motion=True)
         if self.document.disables("frictionloss", "constraint"):
             joint.friction = (0.0,)
         joint.rest = (turned(element.number("springref", 0.0)) - reference,)
@@ -315,11 +324,9 @@ class MjcfReader:
             size, joint.armature = joint.armature[0], (0.0,)
             name = self._free_link(f"{joint.child}_armature")
             own = Inertial(size, inertia=size * np.eye(3))
-            self.model.links[name] = Link(name, own, place=joint.place, gravcomp=1.0)
-            fixed = self._free(f"{name}_fixed")
-            self.model.joints[fixed] = Joint(fixed, "fixed", joint.child, name, place=joint.place)
+            self._fix(Link(name, own, place=joint.place, gravcomp=1.0), joint.child)
             text = "armature of a free joint is mass and inertia of its body, without weight"
-            self.document.source.remarks.translate(joint.place, text)
+            self.remarks.translate(joint.place, text)
 
     def inertia(self) -> JointInertia:
         """Inertias of the joints at zero coordinates, by which the compiler scales springs."""
@@ -332,7 +339,7 @@ class MjcfReader:
             joint, moved = self.model.joints[name], inertia.of(name)
             if moved is None:
                 text = "springdamper: links without mass, or too many, for a mass matrix"
-                self.document.source.remarks.leave_out(joint.place, text, motion=True)
+                self.remarks.leave_out(joint.place, text, motion=True)
                 continue
             joint.stiffness = (moved / max(LEAST, (time * ratio) ** 2),)
             joint.damping = (2.0 * moved / max(LEAST, time),)

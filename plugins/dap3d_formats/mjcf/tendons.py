@@ -32,8 +32,8 @@ def tendon_of(reader: MjcfReader, element: XmlElement, key: str) -> XmlElement:
     Raises:
         FormatError: it is not there.
     """
-    name, holders = element.require(key), reader.document.root.all("tendon")
-    found = next((t for holder in holders for t in holder if t.get("name") == name), None)
+    name, tendons = element.require(key), reader.document.section("tendon")
+    found = next((tendon for tendon in tendons if tendon.get("name") == name), None)
     if found is None:
         raise FormatError(f"there is no tendon {name!r}", element.place)
     return settled_tendon(reader, found)
@@ -51,8 +51,7 @@ def read_tendons(reader: MjcfReader) -> None:
     Raises:
         FormatError: one names a site, geom or joint that is not there.
     """
-    tendons = [t for holder in reader.document.root.all("tendon") for t in holder]
-    for k, given in enumerate(tendons, 1):
+    for k, given in enumerate(reader.document.section("tendon"), 1):
         tendon = settled_tendon(reader, given)
         low, high = reader.document.bounds(tendon, "range", "limited")
         if reader.document.disables("limit", "constraint"):
@@ -87,7 +86,7 @@ def line_of(reader: MjcfReader, tendon: XmlElement, name: str) -> Tendon | None:
                 raise FormatError(f"<fixed>: there is no joint {joint!r}", place)
         if any(reader.model.joints[joint].kind not in (*SCALAR, "fixed") for joint, _ in terms):
             text = "a fixed tendon of a joint of several coordinates"
-            reader.document.source.remarks.leave_out(place, text, motion=True)
+            reader.remarks.leave_out(place, text, motion=True)
             return None
         return Tendon(name, terms=terms, place=place)
     points: list[tuple[str, Any]] = []

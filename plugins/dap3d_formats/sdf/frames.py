@@ -1,5 +1,7 @@
 """Frames of SDF, each given in another one, and the links that they are fixed to."""
 
+from collections.abc import Collection
+
 import attrs
 
 from dap3d_core.interface.formats import WORLD, FormatError, Frame, Place
@@ -70,7 +72,7 @@ class FrameGraph:
             pose, frame, count = here @ pose, relative_to, count + 1
         return pose
 
-    def link_of(self, name: str, links: "dict[str, object]", place: Place) -> str:
+    def link_of(self, name: str, links: Collection[str], place: Place) -> str:
         """The link that a frame is fixed to, or WORLD.
 
         Raises:

@@ -14,7 +14,7 @@ from dap3d_core.interface.formats import (
     XmlElement,
 )
 from dap3d_formats.axes import unit
-from dap3d_formats.sdf.reader import SdfReader, scoped
+from dap3d_formats.sdf.reader import SdfReader, is_true, numbers, scoped, values_of
 
 #: Type -> kind of a joint.
 KINDS = {
@@ -71,8 +71,7 @@ def read_gearbox(reader: SdfReader, element: XmlElement, scope: str) -> None:
     follower, second = _geared(reader, element, scope, reference, "child", "axis2")
     if leader == follower:
         raise FormatError(f"gearbox {name}: its parent is its child", element.place)
-    ratio = element.first("gearbox_ratio")
-    factor = -(1.0 if ratio is None else ratio.content(1)[0]) * first * second
+    factor = -numbers(element, "gearbox_ratio", 1, (1.0,))[0] * first * second
     reader.model.couplings.append(Coupling(name, follower, leader, factor, place=element.place))
     reader.remarks.translate(element.place, "a gearbox couples the rates of two joints")
 
@@ -137,8 +136,7 @@ def _end(reader: SdfReader, element: XmlElement, scope: str, tag: str) -> str:
     if child is None or not child.text.strip():
         raise FormatError(f"<joint> has no <{tag}>; it is required", element.place)
     name = scoped(scope, child.text.strip())
-    links: Any = reader.model.links
-    return reader.frames.link_of(name, links, child.place)
+    return reader.frames.link_of(name, reader.model.links, child.place)
 
 
 def _of_link(reader: SdfReader, link: str, place: Place) -> Frame:
@@ -148,30 +146,31 @@ def _of_link(reader: SdfReader, link: str, place: Place) -> Frame:
 def _axes(reader: SdfReader, joint: Joint, element: XmlElement, scope: str) -> None:
     """Axes, limits and dynamics of a joint."""
     tags = ("axis", "axis2") if joint.kind == "universal" else ("axis",)
-    axes, limits = [], []
-    keys = ("damping", "friction", "stiffness", "rest")
-    columns: dict[str, list[float]] = {key: [] for key in keys}
+    axes, limits, dynamics = [], [], []
     for tag in tags:
         axes.append(_direction(reader, joint.name, element, tag, scope))
         axis: Any = element.first(tag)
         unlimited = element.get("type") == "continuous"
         limits.append(Limits() if unlimited else _limits(axis, joint.name))
-        for key, value in _dynamics(axis).items():
-            columns[key].append(value)
+        dynamics.append(_dynamics(axis))
         _mimic(reader, joint, axis, scope)
     joint.axes, joint.limits = tuple(axes), tuple(limits)
-    joint.damping, joint.friction = tuple(columns["damping"]), tuple(columns["friction"])
-    joint.stiffness, joint.rest = tuple(columns["stiffness"]), tuple(columns["rest"])
+    joint.damping = tuple(one["damping"] for one in dynamics)
+    joint.friction = tuple(one["friction"] for one in dynamics)
+    joint.stiffness = tuple(one["spring_stiffness"] for one in dynamics)
+    joint.rest = tuple(one["spring_reference"] for one in dynamics)
     joint.armature = (_reflected(element), *(0.0,) * (len(axes) - 1))
 
 
 def _reflected(element: XmlElement) -> float:
     """The inertia of a rotor behind a gear, as Drake's extension of the format has it."""
-    rotor, gear = element.first("drake:rotor_inertia"), element.first("drake:gear_ratio")
-    if rotor is None:
+    if element.first("drake:rotor_inertia") is None:
         return 0.0
-    ratio = 1.0 if gear is None else gear.content(1)[0]
-    return float(ratio * ratio * rotor.content(1)[0])
+    ratio, inertia = (
+        numbers(element, "drake:gear_ratio", 1, (1.0,))[0],
+        numbers(element, "drake:rotor_inertia", 1)[0],
+    )
+    return ratio * ratio * inertia
 
 
 def _expressed(
@@ -180,8 +179,7 @@ def _expressed(
     """The direction of an axis in the frame of its joint."""
     xyz = axis.first("xyz")
     frame = None if xyz is None else xyz.get("expressed_in")
-    old = axis.first("use_parent_model_frame")
-    if old is not None and old.text.strip() in ("true", "1"):
+    if is_true(axis, "use_parent_model_frame"):
         frame = "__model__"
     if not frame:
         return tuple(direction)
@@ -194,8 +192,7 @@ def _limits(axis: XmlElement, joint: str) -> Limits:
     limit = axis.first("limit")
     if limit is None:
         return Limits()
-    used = ("lower", "upper", "stiffness")
-    values = {c.name: c.content(1, unbounded=True)[0] for c in limit if c.name in used}
+    values = values_of(limit, "lower", "upper", "stiffness", unbounded=True)
     stiffness = values.get("stiffness", RIGID)
     return Limits.between(
         values.get("lower", -inf), values.get("upper", inf), joint, limit.place,
@@ -204,14 +201,8 @@ def _limits(axis: XmlElement, joint: str) -> Limits:
 
 
 def _dynamics(axis: XmlElement) -> dict[str, float]:
-    dynamics = axis.first("dynamics")
     used = ("damping", "friction", "spring_stiffness", "spring_reference")
-    values = {c.name: c.content(1)[0] for c in dynamics or () if c.name in used}
-    return {
-        "damping": values.get("damping", 0.0), "friction": values.get("friction", 0.0),
-        "stiffness": values.get("spring_stiffness", 0.0),
-        "rest": values.get("spring_reference", 0.0),
-    }  # fmt: skip
+    return dict.fromkeys(used, 0.0) | values_of(axis.first("dynamics"), *used)
 
 
 def _mimic(reader: SdfReader, joint: Joint, axis: XmlElement, scope: str) -> None:
@@ -219,8 +210,7 @@ def _mimic(reader: SdfReader, joint: Joint, axis: XmlElement, scope: str) -> Non
     mimic = axis.first("mimic")
     if mimic is None:
         return
-    used = ("multiplier", "offset", "reference")
-    values = {child.name: child.content(1)[0] for child in mimic if child.name in used}
+    values = values_of(mimic, "multiplier", "offset", "reference")
     ratio = values.get("multiplier", 1.0)
     offset = values.get("offset", 0.0) - ratio * values.get("reference", 0.0)
     leader = scoped(scope, mimic.require("joint"))
@@ -229,7 +219,7 @@ def _mimic(reader: SdfReader, joint: Joint, axis: XmlElement, scope: str) -> Non
 
 def _pitch(element: XmlElement) -> float:
     """Advance in a turn, m, right-handed."""
-    pitch, old = element.first("screw_thread_pitch"), element.first("thread_pitch")
-    if pitch is None and old is not None and old.content(1)[0]:
-        return -2.0 * pi / old.content(1)[0]
-    return 1.0 if pitch is None else pitch.content(1)[0]
+    turns = values_of(element, "thread_pitch").get("thread_pitch", 0.0)
+    if element.first("screw_thread_pitch") is None and turns:
+        return -2.0 * pi / turns
+    return numbers(element, "screw_thread_pitch", 1, (1.0,))[0]

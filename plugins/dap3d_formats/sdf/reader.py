@@ -1,7 +1,7 @@
 """Reads links, frames, nested and included models of SDF."""
 
 from collections.abc import Sequence
-from itertools import combinations
+from itertools import chain, combinations
 from typing import Any
 
 from dap3d_core.interface.formats import (
@@ -21,9 +21,10 @@ from dap3d_core.interface.formats import (
     rpy,
 )
 from dap3d_formats.axes import along
-from dap3d_formats.element_table import NO_CONTACTS, note_elements
+from dap3d_formats.element_table import note_elements
 from dap3d_formats.sdf.elements import CONTACTS, SDF
 from dap3d_formats.sdf.frames import FrameGraph
+from dap3d_formats.shapes import SIZES, add_shapes, hexadecimal
 
 #: Speed below which nothing bounces from which on nothing ever does, m/s: the default is 1e5.
 FAST = 1e3
@@ -36,7 +37,7 @@ class SdfReader:
 
     def __init__(self, source: Source, root: XmlElement) -> None:
         self.source, self.root, self.remarks = source, root, source.remarks
-        self.version = _version(root)
+        _check_version(root)
         self.frames = FrameGraph()
         self.model = Articulation(source.path.stem, gravity=(0.0, 0.0, -9.8), fixed_base=False,
                                   coefficient_of_pair=min, place=root.place)  # fmt: skip
@@ -77,18 +78,13 @@ class SdfReader:
         """The model; links that no joint places are where the file has them."""
         if not self.model.links:
             raise FormatError("holds no <link>", self.root.place)
-        self._place_links()
-        return self.model
-
-    def _place_links(self) -> None:
-        """Poses of the links that no joint places; joints are at zero where the file has them."""
         for name, link in self.model.links.items():
             self.model.base_poses[name] = self.frames.in_world(name, link.place)
+        return self.model
 
     def _include(self, element: XmlElement, outer: str | None, scope: str | None) -> None:
         """A model of another file; its name and pose may be given here."""
-        uri = element.first("uri")
-        name = "" if uri is None else uri.text.strip()
+        name = text_of(element, "uri")
         if not name:
             raise FormatError("<include> has no <uri>; it is required", element.place)
         file = name if name.endswith((".sdf", ".world")) else f"{name.rstrip('/')}/model.sdf"
@@ -131,10 +127,10 @@ class SdfReader:
             self._frame(child, scope)
         for child in element.all("joint"):
             self._joint_frame(child, scope)
-        if outer is None and text_of(element, "self_collide") not in ("true", "1"):
+        if outer is None and not is_true(element, "self_collide"):
             alone = [n for n in list(self.model.links)[before:] if n not in self.self_collide]
             self.model.excluded += combinations(alone, 2)
-        if text_of(element, "static") in ("true", "1"):
+        if is_true(element, "static"):
             self.remarks.translate(element.place, "a static model is a part of ground")
             self.static.append(scoped(scope, ""))
 
@@ -167,16 +163,9 @@ class SdfReader:
         self.frames.add(name, scoped(scope, relative or "__model__"), pose, element.place)
         link = Link(name, place=element.place)
         link.inertial = self._inertial(element)
-        if text_of(element, "self_collide") in ("true", "1"):
+        if is_true(element, "self_collide"):
             self.self_collide.add(name)
-        both = self.source.contacts or not element.all("visual")
-        if element.all("collision") and not self.source.contacts:
-            self.remarks.translate(element.place, NO_CONTACTS, motion=True)
-        for tag in ("visual", "collision") if both else ("visual",):
-            for shape in element.all(tag):
-                geometry = self._geometry(shape, collision=tag == "collision")
-                if geometry is not None:
-                    link.geometries.append(geometry)
+        add_shapes(link, element, self.source, self._geometry)
         self.model.links[name] = link
 
     def _inertial(self, link: XmlElement) -> Inertial:
@@ -189,22 +178,17 @@ class SdfReader:
             raise FormatError('<inertial auto="true">: give mass and inertia', element.place)
         mass, inertia = element.first("mass"), element.first("inertia")
         pose, _ = self.pose(element)
-        values = dict.fromkeys(("ixx", "iyy", "izz"), 1.0) | dict.fromkeys(
-            ("ixy", "ixz", "iyz"), 0.0
-        )
-        for child in inertia or ():
-            if child.name in values:
-                values[child.name] = child.content(1)[0]
-        v = values
+        usual = {"ixx": 1.0, "iyy": 1.0, "izz": 1.0, "ixy": 0.0, "ixz": 0.0, "iyz": 0.0}
+        v = usual | values_of(inertia, *usual)
         rows = [[v["ixx"], v["ixy"], v["ixz"]], [v["ixy"], v["iyy"], v["iyz"]],
                 [v["ixz"], v["iyz"], v["izz"]]]  # fmt: skip
         return Inertial(
             1.0 if mass is None else mass.content(1)[0], pose.r, pose.A @ rows @ pose.A.T
         )
 
-    def _geometry(self, element: XmlElement, *, collision: bool) -> Geometry | None:
-        holder = element.first("geometry")
-        shape = None if holder is None or not holder.children else holder.children[0]
+    def _geometry(
+        self, element: XmlElement, shape: XmlElement | None, collision: bool
+    ) -> Geometry | None:
         if shape is None:
             return None
         pose, _ = self.pose(element)
@@ -212,15 +196,10 @@ class SdfReader:
         common["color"] = _color(element.first("material"))
         if collision and self.source.contacts:
             common["contact"] = _contact(element, self.remarks)
-        if shape.name == "box":
-            return Geometry("box", numbers(shape, "size", 3), **common)
-        if shape.name == "sphere":
-            return Geometry("sphere", numbers(shape, "radius", 1), **common)
-        if shape.name in ("cylinder", "capsule"):
-            size = (*numbers(shape, "radius", 1), *numbers(shape, "length", 1))
-            return Geometry(shape.name, size, **common)
-        if shape.name == "ellipsoid":
-            return Geometry("ellipsoid", numbers(shape, "radii", 3), **common)
+        sizes = SIZES | {"ellipsoid": {"radii": 3}}
+        if shape.name in sizes:
+            size = [numbers(shape, *one) for one in sizes[shape.name].items()]
+            return Geometry(shape.name, tuple(chain(*size)), **common)
         if shape.name == "mesh":
             path = self.source.locate(text_of(shape, "uri"), shape.place)
             scale = numbers(shape, "scale", 3, (1.0, 1.0, 1.0))
@@ -252,10 +231,21 @@ def scoped(scope: str, name: str) -> str:
     return name if name == WORLD or not scope else f"{scope}::{name}"
 
 
-def text_of(element: XmlElement, name: str, default: str = "") -> str:
-    """The text of a child."""
+def text_of(element: XmlElement, name: str) -> str:
+    """The text of a child, "" where there is none."""
     child = element.first(name)
-    return default if child is None else child.text.strip()
+    return "" if child is None else child.text.strip()
+
+
+def is_true(element: XmlElement, name: str) -> bool:
+    """True where a child says so."""
+    return text_of(element, name) in ("true", "1")
+
+
+def values_of(element: XmlElement | None, *names: str, unbounded: bool = False) -> dict[str, float]:
+    """The numbers in children of some names, as far as they are there."""
+    children = [child for child in element or () if child.name in names]
+    return {child.name: child.content(1, unbounded=unbounded)[0] for child in children}
 
 
 def numbers(
@@ -274,10 +264,10 @@ def numbers(
     return child.content(count)
 
 
-def _version(root: XmlElement) -> tuple[int, ...]:
-    """The version of the format that a file says, such as (1, 7)."""
+def _check_version(root: XmlElement) -> None:
+    """Refuse a version of the format that is no numbers, as 1.7 is."""
     try:
-        return tuple(int(part) for part in (root.get("version") or "1.7").split("."))
+        [int(part) for part in (root.get("version") or "1.7").split(".")]
     except ValueError:
         raise FormatError(f"version {root.get('version')!r} is no version", root.place) from None
 
@@ -309,4 +299,4 @@ def _color(material: XmlElement | None) -> str:
     if diffuse is None:
         return ""
     r, g, b, *_ = (*diffuse.content(), 0.0, 0.0, 0.0)
-    return "#" + "".join(f"{round(255 * min(max(x, 0.0), 1.0)):02x}" for x in (r, g, b))
+    return hexadecimal((r, g, b))

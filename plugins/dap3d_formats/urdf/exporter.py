@@ -17,6 +17,7 @@ from dap3d_core.interface.formats import (
     from_quaternion,
     rpy_of,
 )
+from dap3d_formats.shapes import rgba
 from dap3d_formats.unwritten import leave_out_forces
 from dap3d_formats.xml_text import XmlText, words
 
@@ -97,9 +98,8 @@ def _write_shape(text: XmlText, geometry: Geometry) -> None:
         text.empty("mesh", filename=str(geometry.mesh), scale=words(geometry.scale))
     text.close("geometry")
     if geometry.color:
-        r, g, b = (int(geometry.color[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
         text.open("material", name=geometry.color)
-        text.empty("color", rgba=words([r, g, b, 1.0]))
+        text.empty("color", rgba=words(rgba(geometry.color)))
         text.close("material")
     text.close("visual")
 

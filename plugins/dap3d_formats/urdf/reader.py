@@ -1,5 +1,6 @@
 """Reads links and joints of URDF."""
 
+from itertools import chain
 from math import inf
 from typing import Any
 
@@ -21,7 +22,8 @@ from dap3d_core.interface.formats import (
     rpy,
 )
 from dap3d_formats.axes import across, unit
-from dap3d_formats.element_table import NO_CONTACTS, note_elements
+from dap3d_formats.element_table import note_elements
+from dap3d_formats.shapes import SIZES, add_shapes, hexadecimal
 from dap3d_formats.urdf.elements import URDF
 
 #: Type of a joint -> kind of a joint.
@@ -44,7 +46,7 @@ class UrdfReader:
     def read(self) -> Articulation:
         note_elements(self.root, URDF, self.remarks)
         for element in self.root.all("material"):
-            self._material(element)
+            self._color(element)
         for element in self.root.all("link"):
             self._link(element)
         for element in self.root.all("joint"):
@@ -78,14 +80,7 @@ class UrdfReader:
         inertial = element.first("inertial")
         if inertial is not None:
             link.inertial = self._inertial(inertial)
-        both = self.source.contacts or not element.all("visual")
-        if element.all("collision") and not self.source.contacts:
-            self.remarks.translate(element.place, NO_CONTACTS, motion=True)
-        for tag in ("visual", "collision") if both else ("visual",):
-            for shape in element.all(tag):
-                geometry = self._geometry(shape, collision=tag == "collision")
-                if geometry is not None:
-                    link.geometries.append(geometry)
+        add_shapes(link, element, self.source, self._geometry)
         self.model.links[name] = link
 
     def _inertial(self, element: XmlElement) -> Inertial | None:
@@ -102,47 +97,35 @@ class UrdfReader:
             matrix = balanced_inertia(matrix)
         return Inertial(mass.number("value"), frame.r, matrix)
 
-    def _origin(self, element: XmlElement) -> Frame:
-        origin = element.first("origin")
+    def _origin(self, element: XmlElement, tag: str = "origin") -> Frame:
+        origin = element.first(tag)
         if origin is None:
             return Frame()
         zero = (0.0, 0.0, 0.0)
         return Frame(origin.numbers("xyz", 3, zero), rpy(origin.numbers("rpy", 3, zero)))
 
-    def _geometry(self, element: XmlElement, *, collision: bool) -> Geometry | None:
-        holder = element.first("geometry")
-        shape = None if holder is None or not holder.children else holder.children[0]
+    def _geometry(
+        self, element: XmlElement, shape: XmlElement | None, collision: bool
+    ) -> Geometry | None:
         if shape is None:
             self.remarks.leave_out(element.place, f"<{element.name}> without a geometry")
             return None
-        pose, place = self._origin(element), shape.place
-        color = self._color(element.first("material"))
-        common: dict[str, Any] = {
-            "pose": pose,
-            "color": color,
-            "collision": collision,
-            "place": place,
-        }
+        place, pose = shape.place, self._origin(element)
+        common: dict[str, Any] = {"pose": pose, "collision": collision, "place": place}
+        common["color"] = self._color(element.first("material"))
         if collision and self.source.contacts:
             common["contact"] = Contact()
             text = "URDF knows no friction: mu = 1, as MuJoCo takes"
             self.remarks.translate(element.place, text, motion=True)
-        if shape.name == "box":
-            return Geometry("box", shape.numbers("size", 3), **common)
-        if shape.name == "sphere":
-            return Geometry("sphere", (shape.number("radius"),), **common)
-        if shape.name in ("cylinder", "capsule"):
-            radius = shape.number("radius")
-            return Geometry(shape.name, (radius, shape.number("length")), **common)
+        if shape.name in SIZES:
+            sizes = [shape.numbers(*one) for one in SIZES[shape.name].items()]
+            return Geometry(shape.name, tuple(chain(*sizes)), **common)
         if shape.name == "mesh":
             path = self.source.locate(shape.require("filename"), place)
             scale = shape.numbers("scale", 3, (1.0, 1.0, 1.0))
             return None if path is None else Geometry("mesh", mesh=path, scale=scale, **common)
         self.remarks.leave_out(place, f"a shape <{shape.name}>")
         return None
-
-    def _material(self, element: XmlElement) -> None:
-        self._color(element)
 
     def _color(self, element: XmlElement | None) -> str:
         """The colour of a material as #rrggbb, by its name where it is given elsewhere."""
@@ -154,7 +137,7 @@ class UrdfReader:
         if color is None:
             return self.colors.get(name or "", "")
         r, g, b, _ = color.numbers("rgba", 4)
-        text = "#" + "".join(f"{round(255 * min(max(x, 0.0), 1.0)):02x}" for x in (r, g, b))
+        text = hexadecimal((r, g, b))
         if name:
             self.colors[name] = text
         return text
@@ -221,13 +204,9 @@ class UrdfReader:
             what = f"constraint {name}: type {type_!r} is unknown; one of {', '.join(loops)}"
             raise FormatError(what, element.place)
         parent, child = self._ends(element)
-        other = element.first("child_origin")
-        in_child = Frame()
-        if other is not None:
-            zero = (0.0, 0.0, 0.0)
-            in_child = Frame(other.numbers("xyz", 3, zero), rpy(other.numbers("rpy", 3, zero)))
-        joint = Joint(name, loops[type_], parent, child, self._origin(element), in_child,
-                      closes=True, place=element.place)  # fmt: skip
+        joint = Joint(name, loops[type_], parent, child, self._origin(element),
+                      self._origin(element, "child_origin"), closes=True,
+                      place=element.place)  # fmt: skip
         if joint.kind in ("revolute", "prismatic"):
             self._axis(joint, element)
         if name in self.model.joints:

@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Any
 
 import attrs
-import numpy as np
 
+from dap3d_core.interface.formats import Place
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import MISSING, Mistake, SceneError
 from dap3d_core.scene.errors import file_error
@@ -13,7 +13,6 @@ from dap3d_matlab.files.report import FileFacts, Remark, remark
 from dap3d_matlab.language.interpreter import Workspace, follow
 from dap3d_matlab.language.parse import (
     Grammar,
-    Place,
     SourceFile,
     m_files,
     read_source,
@@ -27,7 +26,7 @@ from dap3d_matlab.language.structures import (
     USER_FORCE_FILE,
     ModelFile,
 )
-from dap3d_matlab.language.values import Broken, Struct, kind_of
+from dap3d_matlab.language.values import Broken, Struct, as_array, kind_of
 
 #: Number of other files that are listed by name.
 OTHERS = 50
@@ -155,12 +154,8 @@ def _structs(
     model: Model, name: str, kind: str, workspace: Workspace, path: str
 ) -> list[Struct] | None:
     """The structures in a variable; None where it holds anything else, which is reported."""
-    value = workspace.variables[name]
+    value = as_array(workspace.variables[name])
     line = workspace.places[name].line if name in workspace.places else None
-    if isinstance(value, Struct):
-        value = [value]
-    if isinstance(value, np.ndarray) and value.size == 0:
-        value = []
     if isinstance(value, Broken) or (
         isinstance(value, list) and any(isinstance(v, Broken) for v in value)
     ):

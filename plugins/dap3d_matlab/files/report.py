@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import attrs
 
-from dap3d_matlab.language.parse import Place
+from dap3d_core.interface.formats import Place
 
 
 @attrs.frozen
@@ -27,8 +27,7 @@ class Remark:
         return Place(self.file, self.line)
 
     def __str__(self) -> str:
-        place = ":".join(str(p) for p in (self.file, self.line) if p)
-        return f"{place}: {self.text}"
+        return f"{self.place}: {self.text}"
 
 
 @attrs.frozen

@@ -25,6 +25,7 @@ from dap3d_matlab.language.values import (
     Broken,
     Numbers,
     Struct,
+    copied,
     kind_of,
     make,
     size_of,
@@ -32,8 +33,6 @@ from dap3d_matlab.language.values import (
 
 if TYPE_CHECKING:
     from tree_sitter import Node
-
-_CONSTANTS = {"pi": math.pi}
 
 #: Functions of each element of a matrix.
 _ELEMENTWISE: dict[str, Callable[[Numbers], Numbers]] = {
@@ -138,7 +137,7 @@ class Expressions:
             "number": self._number,
             "string": self._text,
             "identifier": self._name,
-            "parenthesis": lambda node: self._only(node),
+            "parenthesis": self._only,
             "matrix": self._matrix,
             "function_call": self._call,
             "field_expression": self._field,
@@ -198,8 +197,8 @@ class Expressions:
             if isinstance(value, Broken):
                 raise ReportedError
             return value
-        if name in _CONSTANTS:
-            return np.array([[_CONSTANTS[name]]])
+        if name == "pi":
+            return np.array([[math.pi]])
         if name in MAKERS:
             return make(MAKERS[name], self.source.place(node))
         raise self._unknown(node, name)
@@ -207,7 +206,7 @@ class Expressions:
     def _unknown(self, node: "Node", name: str) -> RefusalError:
         if name in _FUNCTIONS:
             return RefusalError(node, f"the function {name} needs arguments")
-        known = [*self.variables, *_CONSTANTS, *_FUNCTIONS, *MAKERS]
+        known = [*self.variables, "pi", *_FUNCTIONS, *MAKERS]
         return RefusalError(node, f"{name} is not defined in this file", "", nearest(name, known))
 
     def _matrix(self, node: "Node") -> Any:
@@ -245,7 +244,7 @@ class Expressions:
         if len(kinds) > 1:
             words = " and ".join(sorted(f"{k}_struct" for k in kinds))
             raise RefusalError(node, f"{words} in one array")
-        return [v if isinstance(v, Broken) else v.copy() for v in array]
+        return list(copied(array))
 
     # ---------------------------------------------------------------- calls and elements
 

@@ -5,16 +5,18 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from dap3d_core.interface.formats import Place
 from dap3d_core.scene import Mistake
 from dap3d_matlab.language.expressions import Expressions, arguments_of, check_field, named_children
 from dap3d_matlab.language.operators import RefusalError, ReportedError, numbers
-from dap3d_matlab.language.parse import Place, SourceFile, excerpt, text_of
+from dap3d_matlab.language.parse import SourceFile, excerpt, text_of
 from dap3d_matlab.language.values import (
     BROKEN,
     LARGEST_MATRIX,
     Broken,
     GivenValue,
     Struct,
+    as_array,
     copied,
     kind_of,
 )
@@ -190,16 +192,13 @@ class _Interpreter:
 
     def _struct(self, owner: "Node") -> Struct:
         """The structure of a field, to be changed in place."""
-        if owner.type == "identifier":
-            name = text_of(owner)
-            if name not in self.variables:
-                what = f"{name} is not defined yet"
-                raise RefusalError(owner, what, f"begin with {name} = Body_struct; or its like")
-            value = self.expressions.value(owner)
-            if isinstance(value, list) and len(value) == 1:
-                value = value[0]
-        else:
-            value = self.expressions.value(owner)
+        name = text_of(owner)
+        if owner.type == "identifier" and name not in self.variables:
+            what = f"{name} is not defined yet"
+            raise RefusalError(owner, what, f"begin with {name} = Body_struct; or its like")
+        value = self.expressions.value(owner)
+        if isinstance(value, list) and len(value) == 1:
+            value = value[0]
         if isinstance(value, Broken):
             raise ReportedError
         if not isinstance(value, Struct):
@@ -227,10 +226,7 @@ class _Interpreter:
     def _set_struct(
         self, target: "Node", name: str, array: Any, arguments: list["Node"], value: Struct
     ) -> None:
-        if isinstance(array, Struct):
-            array = [array]
-        if isinstance(array, np.ndarray) and array.size == 0:
-            array = []
+        array = as_array(array)
         if not isinstance(array, list):
             raise RefusalError(target, f"{name} is {kind_of(array)}, no array of structures")
         kinds = {v.structure.kind for v in array if isinstance(v, Struct)}

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 
+from dap3d_core.interface.formats import Place
 from dap3d_core.scene import MISSING, Mistake, SceneError
 from dap3d_core.scene.errors import file_error
 from dap3d_core.scene.files.read_toml import read_text, unreadable
@@ -32,14 +33,6 @@ SYNTAX_ERRORS = 5
 
 #: Characters of text processors and PDF files in place of those of MATLAB.
 _TYPOGRAPHIC = frozenset("‘’“”–−")
-
-
-@attrs.frozen
-class Place:
-    """A place: file and line, from 1."""
-
-    file: str
-    line: int | None = None
 
 
 @attrs.frozen

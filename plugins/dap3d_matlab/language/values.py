@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_matlab.language.parse import Place
+from dap3d_core.interface.formats import Place
 from dap3d_matlab.language.structures import STRUCTURES, Default, Structure
 
 #: A matrix of numbers; a single number is 1 x 1.
@@ -82,6 +82,13 @@ def copied(value: Any) -> Any:
     if isinstance(value, list):
         return [v if isinstance(v, Broken) else v.copy() for v in value]
     return value.copy() if isinstance(value, np.ndarray) else value
+
+
+def as_array(value: Any) -> Any:
+    """One structure, and no entries, as an array of structures; other values as they are."""
+    if isinstance(value, Struct):
+        return [value]
+    return [] if isinstance(value, np.ndarray) and value.size == 0 else value
 
 
 def size_of(value: Numbers) -> str:

@@ -13,8 +13,7 @@ from dap3d_matlab.translate.fields import Fields, name_of
 #: Tolerance of a rotation matrix.
 ROTATION_TOLERANCE = 1e-6
 #: Fields of a body with reported defaults.
-_REPORTED = ("mass", "Jp", "r")
-_COLOR = 255
+_DEFAULTS = {"mass": "mass = 1", "Jp": "Jp = eye(3)", "r": "r = [0;0;0]"}
 
 
 def add_bodies(scene: Scene, fields: Fields) -> None:
@@ -35,19 +34,15 @@ def add_bodies(scene: Scene, fields: Fields) -> None:
                 f"bodies.{name}.{field}", struct, field if field in struct.given else source
             )
         fields.placed(f"bodies.{name}", struct)
-        _report_defaults(fields, struct)
-        _report_computed(fields, struct)
+        _report(fields, struct, _DEFAULTS)
         scene.add_body(name, **values)
 
 
-def _report_defaults(fields: Fields, struct: Struct) -> None:
-    missing = [f for f in _REPORTED if f not in struct.given]
-    defaults = {"mass": "mass = 1", "Jp": "Jp = eye(3)", "r": "r = [0;0;0]"}
+def _report(fields: Fields, struct: Struct, defaults: dict[str, str]) -> None:
+    """Report defaults, of fields that are not given, and fields that the program computes."""
+    missing = [text for field, text in defaults.items() if field not in struct.given]
     if missing:
-        fields.defaulted(struct, ", ".join(defaults[f] for f in missing))
-
-
-def _report_computed(fields: Fields, struct: Struct) -> None:
+        fields.defaulted(struct, ", ".join(missing))
     for field in struct.given:
         if field in struct.structure.computed:
             fields.left_out(struct, field, "is worked out by the program: not read")
@@ -151,7 +146,7 @@ def _color(fields: Fields, struct: Struct) -> str | None:
     if not all(0.0 <= x <= 1.0 for x in shares):
         fields.refuse(struct, "color", "should be a letter, or three numbers from 0 to 1")
         return None
-    return "#" + "".join(f"{round(_COLOR * x):02x}" for x in shares)
+    return "#" + "".join(f"{round(255 * x):02x}" for x in shares)
 
 
 def add_geometry(scene: Scene, fields: Fields) -> None:
@@ -162,7 +157,7 @@ def add_geometry(scene: Scene, fields: Fields) -> None:
             name = name_of(array, k)
             add = scene.add_point if array == "Points" else scene.add_vector
             add(name, fields.body(struct), fields.vector(struct, field))
-            _note_on_body(fields, struct, field)
+            _report(fields, struct, _defaults_on_body(field))
             fields.placed(f"{table}.{name}", struct)
             fields.placed(f"{table}.{name}.body", struct, "Bindex")
             fields.placed(f"{table}.{name}.{field}", struct, field)
@@ -172,28 +167,22 @@ def add_geometry(scene: Scene, fields: Fields) -> None:
             fields.reference(struct, f"{end}Pindex", "Points", needed=True) for end in ("i", "j")
         ]
         scene.add_vector2(name, *ends)
-        _report_computed(fields, struct)
+        _report(fields, struct, {})
         fields.placed(f"vectors2.{name}", struct)
         for end in ("i", "j"):
             fields.placed(f"vectors2.{name}.P_{end}", struct, f"{end}Pindex")
 
 
-def _note_on_body(fields: Fields, struct: Struct, field: str) -> None:
-    missing = []
-    if "Bindex" not in struct.given:
-        missing.append("Bindex = 0, the ground")
-    if field not in struct.given:
-        missing.append(f"{field} = [0;0;0]")
-    if missing:
-        fields.defaulted(struct, ", ".join(missing))
-    _report_computed(fields, struct)
+def _defaults_on_body(field: str) -> dict[str, str]:
+    """The reported defaults of a point or vector with a field of its components."""
+    return {"Bindex": "Bindex = 0, the ground", field: f"{field} = [0;0;0]"}
 
 
 def add_animation(scene: Scene, fields: Fields) -> None:
     """Add points that are only drawn, and the limits of the drawing."""
     for k, struct in enumerate(fields.model.arrays["Points_anim"] or [], 1):
         body, local = fields.body(struct), fields.vector(struct, "sPp")
-        _note_on_body(fields, struct, "sPp")
+        _report(fields, struct, _defaults_on_body("sPp"))
         if body is not None and local is not None:
             scene.add_animation_point(body, local)
         fields.placed(f"animation.points.{k}", struct)

@@ -3,10 +3,10 @@
 import attrs
 import numpy as np
 
+from dap3d_core.interface.formats import Place
 from dap3d_core.scene import MISSING, Mistake
 from dap3d_matlab.files.model_folder import Model
 from dap3d_matlab.files.report import ImportReport, remark
-from dap3d_matlab.language.parse import Place
 from dap3d_matlab.language.structures import DISKS, FILES
 from dap3d_matlab.language.values import Broken, Struct, kind_of, plain_value
 

@@ -3,9 +3,9 @@
 import re
 from typing import Any
 
+from dap3d_core.interface.formats import Place
 from dap3d_core.scene import MISSING, Mistake, Scene
 from dap3d_matlab.files.report import remark
-from dap3d_matlab.language.parse import Place
 from dap3d_matlab.language.structures import USER_FORCE_FILE
 from dap3d_matlab.translate.fields import Fields, name_of
 

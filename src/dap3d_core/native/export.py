@@ -94,7 +94,8 @@ def export_native(
     if target.exists() and target.is_dir() != (format == "c"):
         what = "a folder" if target.is_dir() else "a file"
         raise refusal(f"{target} is {what}", "give another path")
-    if format == "c" and target.is_dir() and any(target.iterdir()) and not _is_export(target):
+    is_export = all((target / name).is_file() for name in ("dap3d.h", "variables.h"))
+    if format == "c" and target.is_dir() and any(target.iterdir()) and not is_export:
         raise refusal(f"{target} is a folder with files of others", "give another path")
     chosen = platforms_named(platforms)
     options = {"allow_code": allow_code, "registry": registry} | settings
@@ -139,11 +140,6 @@ def model_of(
     # an identifier of C, and part of the names of files
     word = f"_{word}"[:LONGEST] if word[0].isdigit() else word[:LONGEST]
     return Exported(prepared, variables, word, given, directions)
-
-
-def _is_export(folder: Path) -> bool:
-    """True if an export wrote a folder, which another may write over."""
-    return (folder / "dap3d.h").is_file() and (folder / "variables.h").is_file()
 
 
 def _write(model: Exported, platforms: Sequence[Platform], target: Path, fmi: int) -> int:

@@ -70,17 +70,21 @@ def states_of(scene):
     return [f"{body}.{q}" for body in scene.bodies for q in ("r", "p", "rd")]
 
 
-def differences(scene, folder, t_end, count=20, **settings):
-    """Whether the states at communication points are those of a run, bit for bit."""
-    names = states_of(scene)
-    made, library = exported(scene, folder, outputs=names, **settings)
-    result = dap.simulate(scene, t_end=t_end, dt=t_end / count, **settings)
-    run, rows = library.start(t_end), []
+def course(run, result, made, names):
+    """Outputs of a run of an exported model at the instants of a result, and those of that."""
+    rows = []
     for t in result.t:
         assert run.step_to(t)
         rows.append(run.values(made.outputs))
-    expected = np.hstack([result.quantity(name).values for name in names])
-    return np.array_equal(np.array(rows), expected)
+    return np.array(rows), np.hstack([result.quantity(name).values for name in names])
+
+
+def differences(scene, folder, t_end, count=20, more=(), **settings):
+    """Whether states, and more, at communication points are those of a run, bit for bit."""
+    names = [*states_of(scene), *more]
+    made, library = exported(scene, folder, outputs=names, **settings)
+    result = dap.simulate(scene, t_end=t_end, dt=t_end / count, **settings)
+    return np.array_equal(*course(library.start(t_end), result, made, names))
 
 
 @pytest.mark.every(5)
@@ -103,14 +107,11 @@ def test_a_run_has_the_bits_of_simulate(tmp_path, model, t_end, settings):
 @pytest.mark.slow
 def test_so_have_runs_in_joint_coordinates(tmp_path):
     scene = dap.load("pen2")
-    made, library = exported(scene, tmp_path, method="joint", outputs=states_of(scene))
+    names = states_of(scene)
+    made, library = exported(scene, tmp_path, method="joint", outputs=names)
     result = dap.simulate(scene, t_end=0.5, dt=0.05, method="joint")
-    run = library.start(0.5)
-    for k, t in enumerate(result.t):
-        run.step_to(t)
-        expected = np.hstack([result.quantity(name).values[k] for name in states_of(scene)])
-        # poses follow from coordinates by other code here: the same but for the last bits
-        np.testing.assert_allclose(run.values(made.outputs), expected, rtol=0, atol=2e-15)
+    # poses follow from coordinates by other code here: the same but for the last bits
+    np.testing.assert_allclose(*course(library.start(0.5), result, made, names), rtol=0, atol=2e-15)
 
 
 @pytest.mark.slow
@@ -134,6 +135,14 @@ def braced(folder):
     scene = _written(SPRING, folder)
     scene.add_point("post", body="ground", sPp=(0.1, 1.0, 0.0))
     scene.add_force("ptp", "brace", P_i="post", P_j="cart.O", k=20.0, l0=0.5)
+    return scene
+
+
+def pushed(folder):
+    """The cart, with a force that takes other forms at 0.4 s and 0.7 s."""
+    scene = _written(SPRING, folder)
+    scene.add_function("step", "push", x_start=0.4, x_end=0.7, f_start=6.0, f_end=0.0)
+    scene.add_force("f", "pushed", body_i="cart", f=(1.0, 0.0, 0.0), function="push")
     return scene
 
 
@@ -384,11 +393,8 @@ def test_the_example_in_rust_gives_the_same(tmp_path):
     ],
 )
 def test_what_would_be_said_wrongly_is_refused(tmp_path, given, said):
-    scene = _written(SPRING, tmp_path)
-    scene.add_function("step", "push", x_start=0.4, x_end=0.7, f_start=6.0, f_end=0.0)
-    scene.add_force("f", "pushed", body_i="cart", f=(1.0, 0.0, 0.0), function="push")
     with pytest.raises(dap.SceneError, match=said):
-        dap.export_model(scene, tmp_path / "out", format="c", **given)
+        dap.export_model(pushed(tmp_path), tmp_path / "out", format="c", **given)
     assert not (tmp_path / "out").exists()
 
 
@@ -452,16 +458,7 @@ def dropped_capsule():
 @pytest.mark.slow
 def test_contacts_have_the_bits_of_simulate(tmp_path, make, more, settings):
     """Accelerations and loads of joints are means of the step here, too."""
-    scene, t_end = make(), 0.3
-    names = [*states_of(scene), *more]
-    made, library = exported(scene, tmp_path, outputs=names, **settings)
-    result = dap.simulate(scene, t_end=t_end, dt=0.03, **settings)
-    run, rows = library.start(t_end), []
-    for t in result.t:
-        assert run.step_to(t)
-        rows.append(run.values(made.outputs))
-    expected = np.hstack([result.quantity(name).values for name in names])
-    assert np.array_equal(np.array(rows), expected)
+    assert differences(make(), tmp_path, 0.3, 10, more, **settings)
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from support.bouncing import bouncing
-from tests.unit.native.test_export import SPRING, _written, braced, falling_ball
+from tests.unit.native.test_export import SPRING, _written, braced, falling_ball, pushed
 
 import dap3d_core as dap
 from dap3d_core.native.fmu import _in_base_units
@@ -114,16 +114,8 @@ def test_inputs_and_parameters_are_set(tmp_path, fmi):
 def test_a_state_is_kept_and_serialised(tmp_path, fmi):
     scene = dap.load("pen1")
     made = written(scene, tmp_path, fmi=fmi)
-    folder = fmpy.extract(str(made.path), str(tmp_path / "unzipped"))
-    description = fmpy.read_model_description(str(made.path))
-    reference = next(v.valueReference for v in description.modelVariables if v.name == "cone.r.z")
-    fmu = fmpy.instantiate_fmu(folder, description, fmi_type="CoSimulation")
-    if fmi == 2:
-        fmu.setupExperiment(startTime=0.0, stopTime=1.0)
-        fmu.enterInitializationMode()
-    else:
-        fmu.enterInitializationMode(startTime=0.0, stopTime=1.0)
-    fmu.exitInitializationMode()
+    fmu, at = begun(made, tmp_path, fmi)
+    reference = at["cone.r.z"]
     get = fmu.getReal if fmi == 2 else fmu.getFloat64
     keep, put = (fmu.getFMUstate, fmu.setFMUstate) if fmi == 2 else (
         fmu.getFMUState, fmu.setFMUState)  # fmt: skip
@@ -240,10 +232,7 @@ def test_directional_derivatives(tmp_path, fmi):
 
 def test_event_mode_and_early_return(tmp_path):
     """A function that takes another form at 0.4 s and 0.7 s: a step to 1 s ends there."""
-    scene = _written(SPRING, tmp_path)
-    scene.add_function("step", "push", x_start=0.4, x_end=0.7, f_start=6.0, f_end=0.0)
-    scene.add_force("f", "pushed", body_i="cart", f=(1.0, 0.0, 0.0), function="push")
-    made = written(scene, tmp_path, outputs=["cart.r.x"])
+    made = written(pushed(tmp_path), tmp_path, outputs=["cart.r.x"])
     fmu, _ = begun(made, tmp_path, 3, eventModeUsed=True, earlyReturnAllowed=True)
     needs, *_, next_event = fmu.updateDiscreteStates()
     assert (needs, next_event) == (False, 0.4)

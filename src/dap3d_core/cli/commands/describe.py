@@ -41,17 +41,14 @@ def describe(keyword: str, *, names: bool, source: bool, allow_code: bool) -> in
     """
     import dap3d_core as dap
     from dap3d_core.cli.commands.describe_model import is_model, model_data, show_model
-    from dap3d_core.cli.console.console import print_json, stdout
+    from dap3d_core.cli.console.console import print_json, show_data, stdout
 
     registry = dap.load_registry()
     if not _is_type(registry, keyword) and is_model(keyword):
         if names:
             raise Refused(f"--names is of types, and {keyword} is a model; give a keyword")
         model = model_data(keyword, allow_code=allow_code, source=source)
-        if prints_json():
-            print_json({"model": model})
-        else:
-            show_model(stdout(), model)
+        show_data({"model": model}, lambda console: show_model(console, model))
         return DONE
     types = [type_data(registry, kind, word) for kind, word in _types(registry, keyword)]
     if prints_json():

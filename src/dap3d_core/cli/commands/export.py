@@ -4,14 +4,16 @@ import contextlib
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
 from dap3d_core.cli.process.exit_codes import DONE, Refused, refusing
-from dap3d_core.cli.process.streams import prints_json
+
+if TYPE_CHECKING:
+    from dap3d_core.cli.console.console import Terminal
 
 #: Options of the formats c and fmu alone, by parameter.
 NATIVE_OPTIONS = {
@@ -144,7 +146,7 @@ def _export_result(
 def _export_model(model: str, kind: str, output: str | None, *, strict: bool, force: bool) -> int:
     """Write a model by an exporter of a plugin."""
     import dap3d_core as dap
-    from dap3d_core.cli.console.console import print_json, stdout
+    from dap3d_core.cli.console.console import show_data
     from dap3d_core.cli.framework.paths import writable
     from dap3d_core.registry.extensions import extensions
     from dap3d_core.registry.suggestions import did_you_mean
@@ -165,13 +167,13 @@ def _export_model(model: str, kind: str, output: str | None, *, strict: bool, fo
     remarks = {
         key: [one.text for one in getattr(report, key)] for key in ("translated", "left_out")
     }
-    if prints_json():
-        print_json({"file": target, "format": kind} | remarks)
-        return DONE
-    console = stdout()
-    console.say(f"{target} written")
-    console.section("said in another way", remarks["translated"])
-    console.section("left out", remarks["left_out"])
+
+    def show(console: "Terminal") -> None:
+        console.say(f"{target} written")
+        console.section("said in another way", remarks["translated"])
+        console.section("left out", remarks["left_out"])
+
+    show_data({"file": target, "format": kind} | remarks, show)
     return DONE
 
 
@@ -194,7 +196,7 @@ def _export_native(
 ) -> int:
     """Write a model as a C library or an FMU."""
     import dap3d_core as dap
-    from dap3d_core.cli.console.console import count, print_json, stdout
+    from dap3d_core.cli.console.console import count, show_data
     from dap3d_core.cli.framework.paths import writable
     from dap3d_core.result.file.atomic_write import cannot
 
@@ -218,16 +220,12 @@ def _export_native(
         "file": str(target), "format": kind, "platforms": made.platforms, "inputs": made.inputs,
         "parameters": made.parameters, "outputs": made.outputs, "left_out": made.left_out,
     }  # fmt: skip
-    if prints_json():
-        print_json(data)
-        return DONE
-    console = stdout()
-    contents = ", ".join(
-        count(len(names), noun)
-        for names, noun in ((made.inputs, "input"), (made.parameters, "parameter"),
-                            (made.outputs, "output"))
-        if names
-    )  # fmt: skip
-    console.say(f"{target} written: {contents}; {', '.join(made.platforms)}")
-    console.section("left out", list(made.left_out))
+
+    def show(console: "Terminal") -> None:
+        variables = (made.inputs, "input"), (made.parameters, "parameter"), (made.outputs, "output")
+        contents = ", ".join(count(len(names), noun) for names, noun in variables if names)
+        console.say(f"{target} written: {contents}; {', '.join(made.platforms)}")
+        console.section("left out", list(made.left_out))
+
+    show_data(data, show)
     return DONE

@@ -72,22 +72,17 @@ def write_folder(scene: "Scene", report: Any, path: Path, *, force: bool, stub: 
         write_text(plugin, report.stub)
     holds = {table: len(getattr(scene, table)) for table, _, _ in TABLES}
     data = {"scene": target, "plugin": plugin, "holds": holds, **attrs.asdict(report)}
-    show_data(data, lambda console: _show(console, scene, report, target, plugin, stub=stub))
+    show_data(data, lambda console: _show(console, scene.name, report, data, stub=stub))
     return DONE
 
 
 def _show(
-    console: "Terminal",
-    scene: "Scene",
-    report: Any,
-    target: Path,
-    plugin: Path | None,
-    *,
-    stub: bool,
+    console: "Terminal", name: str | None, report: Any, data: dict[str, Any], *, stub: bool
 ) -> None:
     from dap3d_core.cli.console.console import count
 
-    console.title(f"{report.title} model {scene.name}")
+    target, plugin = data["scene"], data["plugin"]
+    console.title(f"{report.title} model {name}")
     rows = [(f.name, f.state, f.holds) for f in report.files]
     console.table(("file", "was", "holds"), rows, fixed=(0, 1))
     console.section("defaulted (the files leave it out)", [str(r) for r in report.defaulted])
@@ -96,7 +91,7 @@ def _show(
     console.section("notes", report.notes)
     if report.user_force:
         _show_user_force(console, report, plugin)
-    sizes = ((len(getattr(scene, name)), one, many) for name, one, many in TABLES)
+    sizes = ((data["holds"][table], one, many) for table, one, many in TABLES)
     holds = ", ".join(count(number, one, many) for number, one, many in sizes if number)
     console.facts([("scene", f"{target}: {holds}"), ("plugin", str(plugin or ""))])
     if stub and not report.stub:

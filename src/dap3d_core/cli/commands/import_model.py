@@ -149,15 +149,10 @@ def _as_data(report: "ImportReport") -> dict[str, Any]:
 
     def remarks(listed: Any) -> list[dict[str, Any]]:
         return [
-            {
-                "file": one.place.file,
-                "line": one.place.line,
-                "text": one.text,
-                "count": one.count,
-                "motion": one.motion,
-            }
+            {"file": one.place.file, "line": one.place.line, "text": one.text,
+             "count": one.count, "motion": one.motion}
             for one in listed
-        ]
+        ]  # fmt: skip
 
     return {
         "file": report.file, "format": report.format, "taken": report.taken,

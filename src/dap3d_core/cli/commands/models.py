@@ -2,25 +2,28 @@
 
 from collections import Counter
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
 from dap3d_core.cli.process.exit_codes import DONE
-from dap3d_core.cli.process.streams import prints_json
+
+if TYPE_CHECKING:
+    from dap3d_core.cli.console.console import Terminal
 
 
 @command("List the shipped models.", options.JSON)
 def models() -> int:
     """List the shipped models."""
-    from dap3d_core.cli.console.console import print_json, stdout
+    from dap3d_core.cli.console.console import show_data
     from dap3d_core.scene import shipped_models
 
     data = {name: _data(folder) for name, folder in shipped_models().items()}
-    if prints_json():
-        print_json({"models": data})
-        return DONE
-    console = stdout()
+    show_data({"models": data}, lambda console: _show(console, data))
+    return DONE
+
+
+def _show(console: "Terminal", data: dict[str, Any]) -> None:
     for group in dict.fromkeys(model["group"] for model in data.values()):
         rows = [
             (name, str(m["bodies"]), ", ".join(m["joints"]) or "-", m["description"])
@@ -33,7 +36,6 @@ def models() -> int:
         console.table(columns, rows, right=(1,), fixed=(0,))
     if own := [name for name, model in data.items() if model["own_types"]]:
         console.say(f"With a type of its own, to be run with --allow-code: {', '.join(own)}")
-    return DONE
 
 
 def _data(folder: Path) -> dict[str, Any]:

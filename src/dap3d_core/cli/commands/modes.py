@@ -1,7 +1,6 @@
 """``dap3d modes``: frequencies, damping, stability and mode shapes of a model about a state."""
 
 import math
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -111,12 +110,15 @@ def _over(
     locus: bool, force: bool, allow_code: bool,
 ) -> int:  # fmt: skip
     """Follow the modes over a parameter, and report them."""
+    import dap3d_core as dap
     from dap3d_core.cli.console.console import show_data
 
-    found = find_modes_over(scene, over, time, number or LISTED, allow_code=allow_code)
+    with options.over_values(over) as (name, values), refusing(dap.SimulationError):
+        found = dap.modes_over(scene, name, values, t=time or 0.0, modes=number or LISTED,
+                               allow_code=allow_code)  # fmt: skip
     _draw(found, ["eigenvalues" if locus else "frequencies"], plot, force=force)
-    data = data_of(scene.name, found)
-    show_data(data, lambda console: show(console, scene.name, found), plot)
+    data = _data_over(scene.name, found)
+    show_data(data, lambda console: _show_over(console, scene.name, found), plot)
     return DONE
 
 
@@ -131,14 +133,9 @@ def _draw(found: Any, names: list[str], plot: str | None, *, force: bool) -> Non
 
 def _targets(plot: str | None, output: str | None, force: bool) -> list[Path]:
     """The files to write; Refused where one cannot be written, or is no picture."""
-    from dap3d_core.cli.framework.paths import RESULTS, refuse_all, writable
+    from dap3d_core.cli.framework.paths import RESULTS, picture_checks, refuse_all, writable
 
-    checks: list[Callable[[], object]] = []
-    if plot is not None:
-        from dap3d_core.plot.figure_file import check_suffix
-
-        checks.append(partial(check_suffix, Path(plot)))
-        checks.append(partial(writable, Path(plot), force=force))
+    checks = [] if plot is None else picture_checks(Path(plot), force=force)
     if output is not None:
         checks.append(partial(writable, Path(output), force=force, kinds=RESULTS))
     refuse_all(*checks)
@@ -230,23 +227,7 @@ def _complex(real: float, imaginary: float) -> str:
     return f"{lead}± {imaginary:.4g}i"
 
 
-def find_modes_over(
-    scene: "Scene", over: str, time: float | None, number: int, *, allow_code: bool
-) -> "ModesOver":
-    """The modes over what --over names.
-
-    Raises:
-        Refused: it is not PARAMETER=FROM:TO:N, or the scene cannot be linearised at a value.
-        SceneError: there is no such parameter, or the values are none.
-    """
-    import dap3d_core as dap
-
-    with options.over_values(over) as (name, values), refusing(dap.SimulationError):
-        return dap.modes_over(scene, name, values, t=time or 0.0, modes=number,
-                              allow_code=allow_code)  # fmt: skip
-
-
-def data_of(name: str, found: "ModesOver") -> dict[str, Any]:
+def _data_over(name: str, found: "ModesOver") -> dict[str, Any]:
     """The modes as data; null where there is no such mode."""
     return {
         "scene": name,
@@ -264,7 +245,7 @@ def data_of(name: str, found: "ModesOver") -> dict[str, Any]:
     }
 
 
-def show(console: "Terminal", name: str, found: "ModesOver") -> None:
+def _show_over(console: "Terminal", name: str, found: "ModesOver") -> None:
     """Print the frequency and damping of each mode at the first and the last value."""
     import numpy as np
 

@@ -183,9 +183,9 @@ def _check(
     force: bool,
 ) -> None:
     """Refuse what cannot be drawn or written, for all reasons at once."""
-    from dap3d_core.cli.framework.paths import refuse_all, writable
+    from dap3d_core.cli.framework.paths import picture_checks, refuse_all
     from dap3d_core.plot.figure import picture_of
-    from dap3d_core.plot.figure_file import SIDES, check_suffix
+    from dap3d_core.plot.figure_file import SIDES
 
     def check_side(name: str, side: float | None) -> None:
         if side is not None and not SIDES[0] <= side <= SIDES[1]:
@@ -194,9 +194,7 @@ def _check(
 
     checks: list[Callable[[], object]] = [partial(check_side, *side) for side in size.items()]
     if target is not None:
-        sources = tuple(map(Path, files))
-        checks += [partial(check_suffix, target)]
-        checks += [partial(writable, target, force=force, sources=sources)]
+        checks += picture_checks(target, force=force, sources=tuple(map(Path, files)))
     if hasattr(data, "data_vars"):  # a sweep
         from dap3d_core.plot.sweep.sweep_table import table_of
 

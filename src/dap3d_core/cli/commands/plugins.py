@@ -1,16 +1,11 @@
 """``dap3d plugins``: all installed types, and why some cannot be used."""
 
-from typing import TYPE_CHECKING
-
 import click
 
 from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
 from dap3d_core.cli.process.exit_codes import DONE, FAILED, Refused
 from dap3d_core.cli.process.streams import prints_json
-
-if TYPE_CHECKING:
-    from dap3d_core.registry import PluginInfo
 
 
 @command(
@@ -52,7 +47,10 @@ def plugins(*, no_compile: bool, limit: float | None, test: bool) -> int:
         print_json({"types": [attrs.asdict(t) for t in types], "notes": registry.notes})
         return DONE
     console = stdout()
-    rows = [(t.kind or "?", t.keyword or "?", _origin(t), t.state) for t in types]
+    rows = [
+        (t.kind or "?", t.keyword or "?", f"{t.distribution} {t.version}".strip() or "-", t.state)
+        for t in types
+    ]
     console.table(("kind", "keyword", "distribution", "state"), rows, fixed=(0, 1, 3))
     faults = [f"{t.keyword or t.distribution}, {t.module}: {t.reason}" for t in types if t.reason]
     console.section("not usable", faults, "red")
@@ -100,7 +98,3 @@ def _test() -> int:
         bad = ", ".join(report.name for report in reports if not report.ok)
         console.say(f"something is wrong in {bad}", "bold red")
     return DONE if good else FAILED
-
-
-def _origin(info: "PluginInfo") -> str:
-    return f"{info.distribution} {info.version}".strip() or "-"

@@ -69,10 +69,9 @@ def response(
     from dap3d_core.result import UnknownNameError
 
     if target is not None:
-        from dap3d_core.cli.framework.paths import refuse_all, writable
-        from dap3d_core.plot.figure_file import check_suffix
+        from dap3d_core.cli.framework.paths import picture_checks, refuse_all
 
-        refuse_all(lambda: check_suffix(Path(target)), lambda: writable(Path(target), force=force))
+        refuse_all(*picture_checks(Path(target), force=force))
     scene = dap.load(model)
     at, t = state_of(start, allow_code) if start else (None, 0.0)
     with refusing(dap.SimulationError, UnknownNameError):

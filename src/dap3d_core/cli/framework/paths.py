@@ -5,6 +5,7 @@ import os
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -79,6 +80,15 @@ def writable(
     if not os.access(target.parent, os.W_OK | os.X_OK):
         raise Refused(f"cannot write {path}: no permission to write in its folder; use -o")
     return path
+
+
+def picture_checks(
+    path: Path, *, force: bool, sources: tuple[Path | None, ...] = ()
+) -> list[Callable[[], object]]:
+    """The checks of a picture to write, for ``refuse_all``."""
+    from dap3d_core.plot.figure_file import check_suffix
+
+    return [partial(check_suffix, path), partial(writable, path, force=force, sources=sources)]
 
 
 def write_text(path: Path, text: str) -> None:

@@ -112,7 +112,8 @@ class _Widener(VectorWriter):
         if found := CALL.match(text):
             function, arguments = found.groups()
             if function.startswith("llvm."):
-                return [f"  {name} = {self.wide(text.replace(function, self._exact(function)))}"]
+                exact = function.replace(".f64", f".v{self.count}f64")
+                return [f"  {name} = {self.wide(text.replace(function, exact))}"]
             return self._each(name, text, arguments) if function in self.external else None
         if (found := _JOINED.fullmatch(text)) and self._has_condition(text):
             a, b = map(self._condition, found.groups()[1:])
@@ -148,9 +149,6 @@ class _Widener(VectorWriter):
         if word not in ("true", "false"):
             raise CompileError("joins a condition of numbers with one of integers")
         return "<" + ", ".join([f"i1 {word}"] * self.count) + ">"
-
-    def _exact(self, function: str) -> str:
-        return function.replace(".f64", f".v{self.count}f64")
 
     def _each(self, name: str, text: str, arguments: str) -> list[str]:
         """A call for each lane."""

@@ -28,6 +28,8 @@ from dap3d_core.study.parameters import SceneParameter, with_values
 TRIALS = (1.001, 0.9975)
 #: What follows from other numbers at the start of a run.
 DERIVED = frozenset(("metric", "smallest", "F", "start", "0.mass_inverse", "0.Jp_inverse"))
+#: The remedy for parameters that cannot be set.
+EXPORT_EACH = "export a model for each value"
 #: Two corrections of a start agree to this part of the length of the scene.
 ALIKE = 1e-9
 
@@ -66,39 +68,27 @@ def places_of(
         why = str(error).splitlines()[0].rstrip(":")
         if isinstance(error, SceneError):
             why = error.mistakes[0].what
-        raise refusal(
-            f"parameter {name} cannot be set in an exported model: a value near its own is "
-            f"refused: {why}",
-            "export a model for each value",
-        ) from error
+        raise _fixed(name, f"a value near its own is refused: {why}") from error
     if any(one.stops != prepared.stops for one in others):
-        raise refusal(
-            f"parameter {name} cannot be set in an exported model: it moves a break point of a "
-            "function, where steps end",
-            "export a model for each value",
-        )
+        raise _fixed(name, "it moves a break point of a function, where steps end")
     if any(outputs_of(one, outputs.names).text != outputs.text for one in others):
-        raise refusal(
-            f"parameter {name} cannot be set in an exported model: outputs depend on it that read "
-            "it as it is in the scene, such as places of points",
-            "leave these outputs out, or export a model for each value",
-        )
+        why = "outputs depend on it that read it as it is in the scene, such as places of points"
+        raise _fixed(name, why, f"leave these outputs out, or {EXPORT_EACH}")
     words, moved = _words(prepared, others, value, trials)
     if words is None:
-        raise refusal(
-            f"parameter {name} cannot be set in an exported model: numbers depend on it that are "
-            "found in Python before a run, or none does",
-            "export a model for each value, or name a number that is used as it is",
-        )
+        why = "numbers depend on it that are found in Python before a run, or none does"
+        raise _fixed(name, why, f"{EXPORT_EACH}, or name a number that is used as it is")
     moves_start = "start" in moved
     start = prepared.start
     if moves_start and not (start and start.moves and all(map(_is_assembled_alike, others))):
-        raise refusal(
-            f"parameter {name} cannot be set in an exported model: the start depends on it, and "
-            "compiled code does not correct it as Python does",
-            "export a model for each value",
-        )
+        why = "the start depends on it, and compiled code does not correct it as Python does"
+        raise _fixed(name, why)
     return Places(words, bool(moved), moves_start)
+
+
+def _fixed(name: str, why: str, remedy: str = EXPORT_EACH) -> SceneError:
+    """The error of a parameter that cannot be set."""
+    return refusal(f"parameter {name} cannot be set in an exported model: {why}", remedy)
 
 
 def _words(

@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from support.command_line import lines_of
 from support.plain import long_in_plain_python
 from unit.simulation.equilibrium.test_continuation import reach
 from unit.study.test_equilibrium_path import pendulum
@@ -50,13 +51,10 @@ def test_json(model, capsys):
     assert len(data["stable"]) == len(data["given"]) == len(x)
 
 
-def test_table_fits_sixty_columns(model, capsys, monkeypatch):
+def test_table_fits_sixty_columns(model):
     """Given values and turning points, with the coordinate that changes most; a picture.
     To return is no failure; a note says how to go on."""
-    monkeypatch.setenv("COLUMNS", "60")
-    assert main([*model, "-o", "curve.png"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert max(map(len, lines)) <= 60
+    lines = lines_of(*model, "-o", "curve.png")
     words = [line.split() for line in lines]
     assert ["9.81", "0", "unstable", "turns"] in words
     assert ["8", "0.289382", "unstable"] in words

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from support.command_line import lines_of
 
 import dap3d_core as dap
 from dap3d_core.cli import main
@@ -50,12 +51,9 @@ def test_json(model, capsys):
     assert data["modes"][0]["bodies"] == {"rod": 1.0}
 
 
-def test_table_fits_sixty_columns(model, capsys, monkeypatch):
+def test_table_fits_sixty_columns(model):
     """The table has frequency, damping, eigenvalue and the body that moves, in 60 columns."""
-    monkeypatch.setenv("COLUMNS", "60")
-    assert main(["modes", model]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert max(map(len, lines)) <= 60
+    lines = lines_of("modes", model)
     assert any(line.split() == ["1", "0.61052", "0", "±", "3.836i", "rod"] for line in lines)
     assert any("stable" in line for line in lines)
 
@@ -78,16 +76,13 @@ def test_from_a_result(model, capsys):
         assert json.loads(capsys.readouterr().out)["t"] == t
 
 
-def test_over_a_parameter(model, capsys, monkeypatch):
+def test_over_a_parameter(model, capsys):
     """--over follows the mode: sqrt(g l m / J) of a rod whose mass and inertia vary."""
-    monkeypatch.setenv("COLUMNS", "60")
     words = ["modes", model, "--over", "bodies.rod.mass=1:3:3"]
     assert main([*words, "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     m = np.array([1.0, 2.0, 3.0])
     exact = np.sqrt(9.81 * 0.5 * m / (1 / 12 + 0.25 * m)) / (2.0 * np.pi)
     np.testing.assert_allclose(np.array(data["frequencies"])[:, 0], exact, rtol=1e-12)
-    assert main([*words, "--plot", "campbell.png"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert max(map(len, lines)) <= 60
+    lines = lines_of(*words, "--plot", "campbell.png")
     assert any(line.split() == ["1", "0.61052", "0.66879", "0", "0"] for line in lines)

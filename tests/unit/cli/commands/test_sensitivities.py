@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import xarray
+from support.command_line import lines_of
 from support.plain import jit_is_on
 
 import dap3d_core as dap
@@ -39,12 +40,9 @@ def test_json(model, capsys):
     np.testing.assert_allclose(one["elasticities"], expected * [G, V0] / z, rtol=1e-11)
 
 
-def test_table_fits_sixty_columns(model, capsys, monkeypatch):
+def test_table_fits_sixty_columns(model):
     """By default the position of the last body; of what is zero there is no elasticity."""
-    monkeypatch.setenv("COLUMNS", "60")
-    assert main([*model, "-o", "stone.png"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert max(map(len, lines)) <= 60
+    lines = lines_of(*model, "-o", "stone.png")
     assert any(line.startswith("stone.r.z = -0.22625 m") for line in lines)
     assert any("####" in line for line in lines)
     assert main([*model, "-o", "stone.png"]) == 2  # it exists

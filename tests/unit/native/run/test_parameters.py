@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.unit.native.test_export import exported, states_of
+from tests.unit.native.test_export import course, exported, states_of
 
 import dap3d_core as dap
 
@@ -22,13 +22,10 @@ def compared(model, names, factors, folder, t_end=0.3, **settings):
         assert run[name] == value
     other = with_values(scene, found, values)
     result = dap.simulate(other, t_end=t_end, dt=t_end / 5.0, **settings)
-    rows = []
-    for t in result.t:
-        run.step_to(t)
-        rows.append(run.values(made.outputs))
+    both = course(run, result, made, outputs)
     with pytest.raises(ValueError, match="before a run begins"):
         run[names[0]] = 2.0 * values[0]
-    return np.array(rows), np.hstack([result.quantity(name).values for name in outputs])
+    return both
 
 
 @pytest.mark.slow
