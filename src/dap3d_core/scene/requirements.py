@@ -13,9 +13,6 @@ from dap3d_core.scene.errors import Key
 from dap3d_core.scene.validate.coerce_values import Fault, text_of
 from dap3d_core.scene.validate.mistake_collector import Collector
 
-#: Any version.
-ANY = "*"
-
 
 def read_requirements(report: Collector) -> str:
     """Check that each distribution is installed, in a version of its range.
@@ -65,7 +62,7 @@ def _range_of(value: Any) -> Any:
     if isinstance(text, Fault):
         return text
     try:
-        return SpecifierSet("" if text.strip() == ANY else text)
+        return SpecifierSet("" if text.strip() == "*" else text)
     except InvalidSpecifier:
         return Fault('should be a range of versions, such as ">=0.2, <1", or "*" for any')
 

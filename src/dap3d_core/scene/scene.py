@@ -7,14 +7,14 @@ import attrs
 
 from dap3d_core.registry.arguments import checked
 from dap3d_core.scene.coerce import entry_of, keys_of, plain, with_identifiers
-from dap3d_core.scene.contacts.tables import ContactTables
+from dap3d_core.scene.contacts.tables import Collisions
 from dap3d_core.scene.display import SceneDisplay
 from dap3d_core.scene.errors import Mistake, MistakeList, SceneError
 from dap3d_core.scene.tables import NAMED, AnimationPoint, Element, SceneTables, fault_of_name
 
 
 @attrs.define(repr=False)
-class Scene(SceneTables, SceneDisplay, ContactTables):
+class Scene(SceneTables, SceneDisplay):
     """A mechanism and the settings of its simulation, as the user described them.
 
     Attributes:
@@ -127,6 +127,37 @@ class Scene(SceneTables, SceneDisplay, ContactTables):
             SceneError: the name is taken or illegal. Fields are checked with the whole scene.
         """
         return self._add_element("shapes", type, name, fields)
+
+    def add_material(self, name: str, **fields: Any) -> str:
+        """Add a material, fields that contacts take from it, and return its name.
+
+        Args:
+            name: without dots, not used by another material.
+            fields: mu, mu_s, mu_roll, mu_spin, e, law, with_, as in ``Material``.
+
+        Raises:
+            SceneError: the name is taken or illegal, or a key is unknown.
+        """
+        return self._add("materials", name, fields)
+
+    def add_contact(self, type: str, name: str | None = None, **fields: Any) -> str:
+        """Add a contact of a type (its keyword) and return its name, made from the type if None.
+
+        Raises:
+            SceneError: the name is taken or illegal. Fields are checked with the whole scene.
+        """
+        return self._add_element("contacts", type, name, fields)
+
+    def add_collisions(
+        self, bodies: Any = "all", exclude: Any = (), material: str | None = None
+    ) -> None:
+        """Let shapes with ``collides=True`` meet; arguments as of ``Collisions``.
+
+        Without it all of them do. Pairs that were excluded before, as by sub-assemblies, remain.
+        """
+        before = self.collisions.exclude if self.collisions else ()
+        pairs = [x if type(x) is tuple else (x,) for x in map(plain, (before, exclude))]
+        self.collisions = Collisions(bodies, (*pairs[0], *pairs[1]), material)
 
     @checked
     def add_requirement(self, name: str, versions: str = "*") -> str:

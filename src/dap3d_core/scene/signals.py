@@ -1,13 +1,13 @@
 """Signals of a scene: functions that combine others, and inputs."""
 
 from collections.abc import Sequence
-from graphlib import CycleError, TopologicalSorter
 
 import attrs
 
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.scene.errors import dotted
 from dap3d_core.scene.expressions.outputs import fault_of_quantity
+from dap3d_core.scene.expressions.parameters import in_order
 from dap3d_core.scene.validate.coerce_values import number_of
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.validated_scene import Instance, arguments_of
@@ -31,16 +31,10 @@ def combine_functions(report: Collector, functions: list[Instance]) -> list[Inst
     for function in functions:
         if of_two := [name for name in _terms(function) if arguments.get(name, 1) > 1]:
             what = f"combines functions of one argument; {of_two[0]} takes two"
-            report.add(("functions", function.name), list(_terms(function)), what)
+            report.add(("functions", function.name), _terms(function), what)
             return functions
     uses = {name: _terms(function) for name, function in known.items()}
-    try:
-        order = list(TopologicalSorter(uses).static_order())
-    except CycleError as error:
-        cycle = error.args[1][::-1]  # each names the next
-        what = f"functions combine one another in a circle: {' -> '.join(cycle)}"
-        report.add(("functions", cycle[0]), list(uses[cycle[0]]), what)
-        return functions
+    order = in_order(report, "functions", uses, uses, "functions combine one another")
     sizes: dict[str, int] = {}
     for name in order:
         if name not in known or not set(uses[name]) <= sizes.keys():
@@ -48,19 +42,17 @@ def combine_functions(report: Collector, functions: list[Instance]) -> list[Inst
         sizes[name] = sum(sizes[term] for term in uses[name]) or 1
         if sizes[name] > MOST_TERMS:
             what = f"combines {sizes[name]} functions, counted as often as they occur"
-            report.add(("functions", name), list(uses[name]), what, "", f"at most {MOST_TERMS}")
+            report.add(("functions", name), uses[name], what, "", f"at most {MOST_TERMS}")
             return functions
         known[name] = attrs.evolve(known[name], terms=tuple(known[term] for term in uses[name]))
     return list(known.values())
 
 
-def _terms(function: Instance) -> tuple[str, ...]:
+def _terms(function: Instance) -> list[str]:
     """Names of the functions that a function combines, in the order of its fields."""
     specs = specs_of(function.type_info.type)
-    return tuple(
-        name for field, spec in specs.items() if spec.kind == "functions"
-        for name in function.values[field]
-    )  # fmt: skip
+    fields = [field for field, spec in specs.items() if spec.kind == "functions"]
+    return [name for field in fields for name in function.values[field]]
 
 
 def read_inputs(report: Collector) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Materials, and how a script adds them and contacts."""
+"""Materials, and which shapes that collide meet each other."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -70,43 +70,3 @@ class Collisions:
     bodies: Any = attrs.field(default="all", converter=plain)
     exclude: Any = attrs.field(default=(), converter=plain)
     material: Any = attrs.field(default=None, converter=plain)
-
-
-class ContactTables:
-    """The part of a scene that takes materials and contacts."""
-
-    __slots__ = ()
-
-    def add_material(self, name: str, **fields: Any) -> str:
-        """Add a material, fields that contacts take from it, and return its name.
-
-        Args:
-            name: without dots, not used by another material.
-            fields: mu, mu_s, mu_roll, mu_spin, e, law, with_, as in ``Material``.
-
-        Raises:
-            SceneError: the name is taken or illegal, or a key is unknown.
-        """
-        scene: Any = self
-        return str(scene._add("materials", name, fields))
-
-    def add_contact(self, type: str, name: str | None = None, **fields: Any) -> str:
-        """Add a contact of a type (its keyword) and return its name, made from the type if None.
-
-        Raises:
-            SceneError: the name is taken or illegal. Fields are checked with the whole scene.
-        """
-        scene: Any = self
-        return str(scene._add_element("contacts", type, name, fields))
-
-    def add_collisions(
-        self, bodies: Any = "all", exclude: Any = (), material: str | None = None
-    ) -> None:
-        """Let shapes with ``collides=True`` meet; arguments as of ``Collisions``.
-
-        Without it all of them do. Pairs that were excluded before, as by sub-assemblies, remain.
-        """
-        scene: Any = self
-        before = scene.collisions.exclude if scene.collisions else ()
-        pairs = [x if type(x) is tuple else (x,) for x in map(plain, (before, exclude))]
-        scene.collisions = Collisions(bodies, (*pairs[0], *pairs[1]), material)

@@ -1,7 +1,6 @@
 """Check of [outputs]: names, expressions, and the order in which they are evaluated."""
 
 from collections.abc import Mapping
-from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
 import attrs
@@ -15,6 +14,7 @@ from dap3d_core.scene.expressions.expression import (
     fault_of_word,
     read_expression,
 )
+from dap3d_core.scene.expressions.parameters import in_order, values_of
 from dap3d_core.scene.tables import SceneTables, fault_of_name
 from dap3d_core.scene.validate.coerce_values import Fault
 from dap3d_core.scene.validate.mistake_collector import Collector
@@ -56,8 +56,6 @@ def parameters_of(report: Collector) -> dict[str, float]:
     scene = report.scene
     if not scene.parameters:
         return {}
-    from dap3d_core.scene.expressions.parameters import values_of
-
     taken = {"t", "work", *scene.inputs, *scene.outputs}
     return {name: x for name, x in values_of(report).items() if name not in taken}
 
@@ -123,13 +121,8 @@ def _in_order(report: Collector, expressions: Mapping[str, Expression]) -> dict[
         name: [head for head in (n.partition(".")[0] for n in e.names) if head in expressions]
         for name, e in expressions.items()
     }
-    try:
-        order = list(TopologicalSorter(uses).static_order())
-    except CycleError as error:
-        cycle = error.args[1][::-1]  # each names the next
-        what = f"outputs name one another in a circle: {' -> '.join(cycle)}"
-        report.add(("outputs", cycle[0]), expressions[cycle[0]].text, what)
-        return {}
+    texts = {name: e.text for name, e in expressions.items()}
+    order = in_order(report, "outputs", uses, texts, "outputs name one another")
     depth: dict[str, int] = {}
     for name in order:
         depth[name] = 1 + max((depth[other] for other in uses[name]), default=0)

@@ -1,6 +1,6 @@
 """[parameters] of a scene: numbers by name, and text that begins with "=" in their place."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from graphlib import CycleError, TopologicalSorter
 from typing import Any, TypeVar
 
@@ -129,15 +129,34 @@ def values_of(report: Collector) -> dict[str, float]:
             if not isinstance(number, Fault):
                 values[name] = number
     uses = {n: [other for other in e.names if other in expressions] for n, e in expressions.items()}
-    try:
-        order = list(TopologicalSorter(uses).static_order())
-    except CycleError as error:
-        cycle = error.args[1][::-1]
-        what = f"parameters name one another in a circle: {' -> '.join(cycle)}"
-        report.add(("parameters", cycle[0]), report.scene.parameters[cycle[0]], what)
-        order = []
-    for name in order:
+    written = report.scene.parameters
+    for name in in_order(report, "parameters", uses, written, "parameters name one another"):
         number = _value(report, ("parameters", name), expressions[name], values)
         if number is not None:
             values[name] = number
     return {name: values[name] for name in report.scene.parameters if name in values}
+
+
+def in_order(
+    report: Collector,
+    table: str,
+    uses: Mapping[str, Sequence[str]],
+    written: Mapping[str, Any],
+    what: str,
+) -> list[str]:
+    """Names of a table, each behind those that it uses; none, and a mistake, for a circle.
+
+    Args:
+        report: takes the mistake.
+        table: of the names.
+        uses: name -> names that its value uses.
+        written: name -> its value.
+        what: the fault, without "in a circle".
+    """
+    try:
+        return list(TopologicalSorter(uses).static_order())
+    except CycleError as error:
+        cycle = error.args[1][::-1]  # each names the next
+        circle = f"{what} in a circle: {' -> '.join(cycle)}"
+        report.add((table, cycle[0]), written[cycle[0]], circle)
+        return []

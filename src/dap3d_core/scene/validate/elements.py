@@ -22,7 +22,7 @@ from dap3d_core.scene.validate.geometry import (
     BAD,
     Geometry,
     Located,
-    body_of,
+    body_index_of,
     entry_of,
     missing_words,
     named_row,
@@ -204,8 +204,8 @@ class _Reading:
     def body(self, field: _Field, value: Any) -> None:
         self.values[field.name] = value
         if value is not None:
-            bodies = self.reader.geometry.bodies
-            body = body_of(self.report, bodies, (*self.key, field.name), value)
+            index = self.reader.geometry.bodies.body_index
+            body = body_index_of(self.report, index, (*self.key, field.name), value)
             self.set_body(field.name, field.slot, body)
 
     def point(self, field: _Field, value: Any) -> None:

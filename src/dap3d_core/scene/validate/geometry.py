@@ -1,6 +1,6 @@
 """Points and vectors: the body of each, and the resolution of references."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import islice
 from typing import Any
 
@@ -146,18 +146,13 @@ def vector_of(
     return vector
 
 
-def body_of(report: Collector, bodies: Bodies, key: Key, name: Any) -> int:
-    """Index of the body of a reference; BAD where a mistake is reported."""
-    return body_index_of(report, bodies.body_index, key, name)
-
-
 def entry_of(report: Collector, geometry: Geometry, key: Key, kind: str, name: Any) -> Any:
     """An entry of a list of points, vectors or bodies, with its body; None where it is wrong."""
     if kind == "points":
         return point_of(report, geometry, key, name)
     if kind == "vectors":
         return vector_of(report, geometry, key, name, unit=True)
-    body = body_of(report, geometry.bodies, key, name)
+    body = body_index_of(report, geometry.bodies.body_index, key, name)
     return None if body == BAD else (body, name)
 
 
@@ -255,13 +250,15 @@ def _numbered(number: int, declared: Collection[str]) -> str:
     return f"number {number} in the order of the file is {next(islice(declared, index, None))!r}"
 
 
-def _bodies_of(report: Collector, keys: Keys, names: list[Any], bodies: Bodies) -> list[int]:
+def _bodies_of(
+    report: Collector, keys: Sequence[Key], names: list[Any], bodies: Bodies
+) -> list[int]:
     """Body indices of a column of names."""
     if set(map(type, names)) <= {str}:
         indices = [bodies.body_index.get(name, BAD) for name in names]
         if BAD not in indices:
             return indices
-    return [body_of(report, bodies, keys[k], name) for k, name in enumerate(names)]
+    return [body_index_of(report, bodies.body_index, keys[k], name) for k, name in enumerate(names)]
 
 
 def _directions(report: Collector, names: tuple[str, ...]) -> tuple[Floats, Floats]:
@@ -283,11 +280,11 @@ def _directions(report: Collector, names: tuple[str, ...]) -> tuple[Floats, Floa
 def _animation(report: Collector, bodies: Bodies) -> tuple[list[int], Floats]:
     """Bodies and coordinates of the animation points; the limits are checked as well."""
     points = report.scene.animation.points
-    keys = [("animation", "points", k) for k in range(len(points))]
-    on = [
-        body_of(report, bodies, (*key, "body"), p.body) for key, p in zip(keys, points, strict=True)
-    ]
-    at = vectors(report, [(*key, "sPp") for key in keys], [p.sPp for p in points], 3)
+    key = ("animation", "points")
+    keys_of_bodies = [(*key, k, "body") for k in range(len(points))]
+    on = _bodies_of(report, keys_of_bodies, [p.body for p in points], bodies)
+    keys = [(*key, k, "sPp") for k in range(len(points))]
+    at = vectors(report, keys, [p.sPp for p in points], 3)
     limits = report.scene.animation.limits
     if limits is not None and not _are_limits(limits):
         what = "should be three pairs [[x_min, x_max], [y_min, y_max], [z_min, z_max]], min < max"
