@@ -12,7 +12,7 @@ NEAR = 1e-140
 class PointToPoint(Force):
     """Spring, damper and actuator, in parallel, on the line from P_i to P_j (manual: ``ptp``).
 
-    Sign of the manual: a positive f_a is a tension, and decreases the length. Spec 6. With
+    Sign of the manual: a positive f_a is a tension, and decreases the length. With
     l = |d|, u = d / l and l_dot = u . d_dot:
 
         F = k (l - l0) + c l_dot + f_a,  force F u at P_i on body i and -F u at P_j on body j

@@ -11,7 +11,7 @@ ZERO = (0.0, 0.0, 0.0)
 class Weight(Force):
     """Every body is pulled along wgt by its mass times gravity (manual: ``weight``).
 
-    Spec 6. On each body, at its mass centre:
+    On each body, at its mass centre:
 
         force = mass gravity wgt,  moment = 0,  energy = -mass gravity wgt . r
     """

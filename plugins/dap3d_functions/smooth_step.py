@@ -10,7 +10,7 @@ interface_version = 1
 class SmoothStep(Step):
     """From f_start to f_end, at rest and without curvature at both ends (manual: type ``b``).
 
-    Spec 7. With D = x_end - x_start, u = (x - x_start) / D and h = f_end - f_start:
+    With D = x_end - x_start, u = (x - x_start) / D and h = f_end - f_start:
 
         f = f_start + h (10 u^3 - 15 u^4 + 6 u^5),  constant before x_start and after x_end
     """

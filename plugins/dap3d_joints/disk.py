@@ -12,7 +12,7 @@ X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 class Disk(Joint):
     """A disk of radius R, its axis the eta axis of body i, on the plane z = 0 (manual: ``disk``).
 
-    Spec 5. With k = z, c = k . eta and sigma = sqrt(1 - c^2), the sine of the angle between disk
+    With k = z, c = k . eta and sigma = sqrt(1 - c^2), the sine of the angle between disk
     and ground, the body origin being the disk's centre:
 
         t = (k x eta) / sigma     longitudinal, along the track

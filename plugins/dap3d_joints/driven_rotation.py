@@ -24,7 +24,7 @@ class DrivenRotation(Joint):
 
     A growing f increases the angle that a ``rev`` or ``cyl`` of the same bodies i and j reports.
     ``rel-rot`` has the opposite sign, that of the manual, and no position level: there the angle
-    drifts. Without a function it locks the angle. Spec 4.7; n_j and m_j complete a_j to a triad on
+    drifts. Without a function it locks the angle. n_j and m_j complete a_j to a triad on
     body j; u_i, fixed in body i, is n_j in the poses as given. With X = n_j . u_i, Y = m_j . u_i
     and Z = a_j . u_i, theta = atan2(Y, X), and C is brought into (-pi, pi]:
 

@@ -25,8 +25,8 @@ class DrivenTranslation(Joint):
 
     A growing f increases the length that a ``tran`` or ``cyl`` of the same bodies i and j reports.
     ``rel-tran`` has the opposite sign, that of the manual, and no position level; this one takes
-    any two points, and is right where body j turns. Spec 4.8; without points those of the mass
-    centres; without a function it locks the distance. With d = r_Pj - r_Pi:
+    any two points, and is right where body j turns. Without points it takes
+    the mass centres, without a function it locks the distance. With d = r_Pj - r_Pi:
 
         C     = -a_j . d - length - f                length given
         C     = a_j . (d(0) - d) - (f - f_0)         length left out: C = 0 in the poses as given

@@ -10,7 +10,7 @@ interface_version = 1
 class Parallel(Joint):
     """Axis a_i stays parallel to a_j; the translations and the rotation about it are left free.
 
-    Spec 3.2. n_j and m_j complete a_j to a triad on body j. Two rows, for b = n_j and b = m_j:
+    n_j and m_j complete a_j to a triad on body j. Two rows, for b = n_j and b = m_j:
 
         C     = a_i . b
         J_i   = [0, (a_i x b)^T],  J_j = [0, -(a_i x b)^T]

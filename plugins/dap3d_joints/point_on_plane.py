@@ -22,7 +22,7 @@ class PointOnPlane(Joint):
     """The coordinate of P_i along a_j, a vector of ground, is length + f(t) (manual: ``rP``).
 
     A growing f moves the point along a_j: it increases the length of a ``tran`` of body i and
-    ground. Spec 4.9. Without P_i that of the mass centre; without a function the point stays on a
+    ground. Without P_i it is the mass centre; without a function the point stays on a
     plane. One row, on body i alone:
 
         C     = a_j . r_Pi - length - f

@@ -24,7 +24,7 @@ class RelativeRotation(Joint):
     Sign of the manual: a growing f, or a positive input, decreases the angle that a ``rev`` or
     ``cyl`` of the same bodies i and j reports; ``drive-rot`` increases it.
 
-    Spec 4.7. One row, of the velocity level alone; without a function it locks the rotation. An
+    One row, of the velocity level alone; without a function it locks the rotation. An
     input may give the rate in place of f_dot: it is held, and velocities jump where it is set.
 
         J v   = a_j . (w_j - w_i) = f_dot = nu

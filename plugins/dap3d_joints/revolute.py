@@ -11,7 +11,7 @@ interface_version = 1
 class Revolute(Joint):
     """Point P_i stays on P_j and axis a_i along a_j; one rotation is left free (manual: ``rev``).
 
-    Spec 3.1, 3.2, 4.2. n_j and m_j complete a_j to a triad on body j. Rows 1 to 3 are those of the
+    n_j and m_j complete a_j to a triad on body j. Rows 1 to 3 are those of the
     spherical joint; rows 4 and 5, for b = n_j and b = m_j, keep the axes parallel:
 
         C     = a_i . b

@@ -10,7 +10,7 @@ class SphericalSpherical(Joint):
     """The distance of P_i and P_j stays the length of a massless link (manual: ``sph-sph``).
 
     With a function of time it is a driven leg, without mass: l = length + f, and a growing f
-    increases the length (``Leg``). Spec 4.3. One row, with d the vector from P_i to P_j and l its
+    increases the length. One row, with d the vector from P_i to P_j and l its
     length:
 
         C     = (d . d - l^2) / 2
@@ -18,7 +18,7 @@ class SphericalSpherical(Joint):
         gamma = d . (w_i x s_i_dot - w_j x s_j_dot) - d_dot . d_dot
 
     lambda |d| is the force in the link, negative in tension, also with a function. An input
-    is the speed at which the leg becomes longer, held between settings (``Paced``): the row is then
+    is the speed at which the leg becomes longer, held between settings: the row is then
     one of the velocity level alone, and velocities jump where it is set.
     """
 

@@ -46,6 +46,8 @@ def test_a_dead_point_saves_what_was_found_before(dap3d):
     done = dap3d("kinematics", "press.toml", "--over", "ram.q=0:1:101", "-o", "a.nc")
     assert done.returncode == 3
     assert "dead point at ram.q = 0.0" in " ".join(done.stderr.split())
+    assert "up to ram.q = 0 m, is in a.nc" in " ".join(done.stderr.split())
+    assert "ram.q = 0 m, 1 instant reported" in done.stdout
     kept = dap.open(dap3d.folder / "a.nc")
     assert kept.status == "stopped"
     assert kept.t[-1] == 0.0

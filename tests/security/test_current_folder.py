@@ -6,7 +6,7 @@ import os
 
 import pytest
 from support.falling import SCENE
-from support.process import run
+from support.process import run, start
 
 import dap3d_core as dap
 
@@ -35,6 +35,15 @@ def test_a_matplotlibrc_is_not_opened(folder):
     """Whatever it holds, also what would stop the import: whoever opens this pipe waits."""
     os.mkfifo(folder / "matplotlibrc")
     assert run(PLOT, cwd=folder, MPLCONFIGDIR=folder / "none") == "1.5 False"
+
+
+@pytest.mark.slow
+def test_a_home_that_cannot_be_written_is_no_matter(folder):
+    """matplotlib has a cache of its own, and two lines of advice where it cannot keep that."""
+    (folder / "home").write_text("no folder")
+    process = start(PLOT, cwd=folder, HOME=folder / "home", MPLCONFIGDIR="", XDG_CONFIG_HOME="")
+    assert process.communicate(timeout=300)[1] == ""
+    assert process.returncode == 0
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 """Plot layer: quantities of a result as curves, in a window or a file; its motion as a film."""
 
+import logging
 import os
 import sys
 
@@ -8,7 +9,8 @@ def _import_matplotlib() -> None:
     """Import matplotlib with the user's settings, not with those of the current folder.
 
     A ``matplotlibrc`` there may be that of a stranger's model, and may have names read as TeX.
-    A script that has imported matplotlib before has decided for itself.
+    A script that has imported matplotlib before has decided for itself. That its own cache cannot
+    be kept, where the home folder cannot be written, matters to nobody here.
 
     Raises:
         OSError: ``MPLBACKEND`` names no backend.
@@ -18,6 +20,9 @@ def _import_matplotlib() -> None:
     here = os.getcwd() if os.path.lexists("matplotlibrc") else None
     if here is not None:
         os.chdir(os.path.abspath(os.sep))
+    log = logging.getLogger("matplotlib")
+    level = log.level
+    log.setLevel(logging.ERROR)
     try:
         import matplotlib  # noqa: F401
     except ValueError as error:
@@ -29,6 +34,7 @@ def _import_matplotlib() -> None:
             "matplotlib; name one, such as Agg, or unset it"
         ) from error
     finally:
+        log.setLevel(level)
         if here is not None:
             os.chdir(here)
 

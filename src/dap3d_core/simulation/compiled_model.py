@@ -375,7 +375,8 @@ class CompiledModel:
         rank = start.redundancy.rank
         if rank.redundant:
             fits = (f.name for f in FORMULATIONS.values() if f.accepts_redundant and f.is_exact)
-            return next(fits), f"{rank.redundant} of {rank.rows} rows are redundant"
+            verb = "is" if rank.redundant == 1 else "are"
+            return next(fits), f"{rank.redundant} of {rank.rows} rows {verb} redundant"
         return method, f"{reason}, and their rows are independent"
 
     @property

@@ -174,7 +174,7 @@ def _class_data(type_info: "TypeInfo") -> dict[str, Any]:
     elif type_.kind == "joint":
         data |= {
             "rows": type_info.row_count,
-            "position_rows": len(type_.position_rows()),
+            "position_rows": sum(type_.constraint_mask()),
             "freedoms": 6 * max(len(type_info.layout.slots) - 1, 1) - type_info.row_count,
         }
     return data

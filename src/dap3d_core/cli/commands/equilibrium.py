@@ -1,6 +1,5 @@
 """``dap3d equilibrium``: where a model comes to rest."""
 
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -170,7 +169,7 @@ def _data(found: "Equilibrium", model: str, more_notes: list[str]) -> dict[str, 
 
 
 def _show(console: "Terminal", data: dict[str, Any], target: Path | None) -> None:
-    from dap3d_core.cli.console.console import count, scene_name
+    from dap3d_core.cli.console.console import count, scene_name, shell_word
     from dap3d_core.cli.console.run_summary import degrees_of_freedom
 
     kind = "stable" if data["stable"] else "unstable"
@@ -194,7 +193,7 @@ def _show(console: "Terminal", data: dict[str, Any], target: Path | None) -> Non
     console.section("notes", data["notes"])
     if target is not None:
         console.say(f"{target} written: the scene at rest. Next:", whole=True)
-        console.say(f"dap3d run {shlex.quote(str(target))}", "green", indent=2, whole=True)
+        console.say(f"dap3d run {shell_word(target)}", "green", indent=2, whole=True)
 
 
 def _show_vectors(console: "Terminal", heading: str, rows: list[tuple[str, str, Any]]) -> None:

@@ -7,6 +7,7 @@ messages keep their lines, for programs that look for places in them.
 import json
 import math
 import os
+import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -254,6 +255,12 @@ def json_value(value: Any) -> Any:
     if isinstance(value, (list, tuple, set, frozenset)):
         return [json_value(v) for v in value]
     return str(value)
+
+
+def shell_word(path: str | Path) -> str:
+    """A path as a word of a shell, which no command takes for an option."""
+    text = str(path)
+    return shlex.quote(f"./{text}" if text.startswith("-") else text)
 
 
 def clean(words: str) -> str:

@@ -198,6 +198,8 @@ def live_line(run: "RunProgress", rate: float, width: int) -> str:
     pace = f"{rate:.3g}" if rate else "-"
     step, drift = f"{run.step:.1e}", f"drift {run.drift:.0e}"
     left = f"{_left(run.t_end - run.t, rate)} left"
+    if not run.step:  # kinematics, maybe over an angle: nothing is integrated
+        return _longest((f"{percent} {left}", percent[:width]), width)
     return _longest(
         (
             f"{percent}  t = {now} of {end} s  step {run.steps:,}: {step} s  {pace:>5}x real time  "
@@ -215,6 +217,8 @@ def live_line(run: "RunProgress", rate: float, width: int) -> str:
 def plain_line(run: "RunProgress", rate: float) -> str:
     """The same for a file or another program."""
     left = seconds((run.t_end - run.t) / rate) if rate else "?"
+    if not run.step:
+        return f"{run.t / run.t_end:.0%}, about {left} left"
     return (
         f"t = {run.t:.4g} of {run.t_end:.4g} s ({run.t / run.t_end:.0%}), step {run.step:.2g} s, "
         f"{rate:.3g} x real time, energy drift {run.drift:.0e}, about {left} left"

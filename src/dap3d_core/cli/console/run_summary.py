@@ -4,7 +4,7 @@
 """
 
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,7 @@ from dap3d_core.cli.console.console import (
     print_json,
     scene_name,
     seconds,
+    shell_word,
     size,
     stderr,
     stdout,
@@ -203,7 +204,7 @@ def _show_run(
         show_correction(console, initial)
     show_details(console, data)
     console.say(f"{target} written ({size(target.stat().st_size)}). Next:", whole=True)
-    file = shlex.quote(str(target))
+    file = shell_word(target)
     quantities = [f"{name}.actuation" for name in outcome.result.record.actuation]
     quantities = quantities or [f"{outcome.result.summary.body_names[0]}.r"]
     words = " ".join(map(shlex.quote, quantities[:MOST_PLOTTED]))
@@ -215,11 +216,12 @@ def _show_run(
 def _show_early_end(outcome: RunOutcome, target: Path) -> None:
     console = stderr()
     console.say(outcome.reason, "bold red")
-    last = f"t = {outcome.result.t[-1]:.6g} s"
+    symbol, unit = _abscissa(outcome.result.settings)
+    last = f"{symbol} = {outcome.result.t[-1]:.6g} {unit}"
     console.say(f"what was computed until then, up to {last}, is in {target}")
     if outcome.checkpoint is not None:
         console.say("to continue from there:")
-        command = f"dap3d resume {shlex.quote(str(outcome.checkpoint))}"
+        command = f"dap3d resume {shell_word(outcome.checkpoint)}"
         console.say(command, "green", indent=2, whole=True)
 
 
@@ -275,13 +277,19 @@ def _integrator(data: dict[str, Any]) -> str:
 
 
 def _simulated(data: dict[str, Any]) -> str:
-    """The time span and the number of reported instants."""
+    """The span of time, or of a driver's coordinate, and the number of reported instants."""
     if not data["instants"]:
         return "nothing"
-    span = f"t = {data['t_start']:g} to {data['t_end']:.6g} s"
+    label, unit = _abscissa(data["settings"])
+    span = f"{label} = {data['t_start']:g} to {data['t_end']:.6g} {unit}"
     if data["t_start"] == data["t_end"]:
-        span = f"t = {data['t_start']:g} s"
+        span = f"{label} = {data['t_start']:g} {unit}"
     return f"{span}, {count(data['instants'], 'instant')} reported"
+
+
+def _abscissa(settings: Mapping[str, Any]) -> tuple[str, str]:
+    """Symbol and unit of time, or of the driver's coordinate that kinematics has in its place."""
+    return settings.get("over") or "t", settings.get("over_unit") or "s"
 
 
 def _error_text(error: dict[str, Any] | None) -> str:

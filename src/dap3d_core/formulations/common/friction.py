@@ -4,7 +4,7 @@ The multipliers are found by a fixed-point iteration, from those without these f
 give equal accelerations, whatever came before. Each pass is extrapolated from the difference of the
 two before (Irons and Tuck, Int. J. Numer. Meth. Engng 1 (1969) 275); of forces on reactions from
 those of more passes (Anderson, J. ACM 12 (1965) 547): brakes that load themselves, each by a part
-of its own, settle in as many passes as there are. Spec 6.1.
+of its own, settle in as many passes as there are.
 """
 
 from collections.abc import Callable

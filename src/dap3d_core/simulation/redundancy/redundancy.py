@@ -171,8 +171,9 @@ class Redundancy:
         freedoms = f"{rank.dof} degree{'s' if rank.dof != 1 else ''} of freedom"
         if not rank.redundant:
             return f"{rank.rows} rows, all independent; {freedoms}"
+        verb = "is" if rank.redundant == 1 else "are"
         text = (
-            f"{rank.redundant} of {rank.rows} constraint rows are redundant (rank {rank.rank} "
+            f"{rank.redundant} of {rank.rows} constraint rows {verb} redundant (rank {rank.rank} "
             f"by {rank.method}, tolerance {rank.tolerance:.1e}); {freedoms}. "
             f"{self.describe_groups()}"
         )

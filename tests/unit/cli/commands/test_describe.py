@@ -63,6 +63,11 @@ def test_every_type_is_described(kind, keyword):
             assert spec.unit in text
 
 
+def test_rows_that_find_an_unknown_constrain_no_body():
+    """A slot in a plate has two rows, of which one finds the place on its curve."""
+    assert "1 constraint equation; leaves 5 of 6 freedoms" in described("oncurve")
+
+
 def test_the_freedoms_that_joints_leave():
     """6 less the rows, for each variant."""
     left = {"sph": 3, "rev": 1, "sph-sph": 5, "cyl": 2, "tran": 1, "univ": 2, "fix": 0, "rP": 5}

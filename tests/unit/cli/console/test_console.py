@@ -2,7 +2,15 @@
 
 import numpy as np
 
-from dap3d_core.cli.console.console import clean, count, json_value, seconds, size, stdout
+from dap3d_core.cli.console.console import (
+    clean,
+    count,
+    json_value,
+    seconds,
+    shell_word,
+    size,
+    stdout,
+)
 
 
 def test_control_characters_do_not_reach_the_terminal():
@@ -23,6 +31,11 @@ def test_numbers_for_people():
     assert sizes == ["999 bytes", "1.5 kB", "2.35 MB", "5 GB"]
     counts = [count(n, "body", "bodies") for n in (0, 1, 2000)]
     assert counts == ["no bodies", "1 body", "2,000 bodies"]
+
+
+def test_a_path_is_one_word_of_a_shell_and_no_option():
+    words = [shell_word(path) for path in ("run.nc", "my run.nc", "-x.nc", "a/-x.nc")]
+    assert words == ["run.nc", "'my run.nc'", "./-x.nc", "a/-x.nc"]
 
 
 def test_an_empty_column_breaks_no_other(capsys):

@@ -75,6 +75,14 @@ def test_the_live_line_keeps_its_width_and_fits_any_terminal():
     assert "about ? left" in progress.plain_line(standing(0.1), 0.0)  # before the pace is known
 
 
+def test_kinematics_has_neither_steps_nor_drift():
+    """Over a driver's coordinate it has no time either: what is done and left is all there is."""
+    run = RunProgress(t=1.5, t_end=6.0, steps=0, step=0.0, drift=0.0)
+    assert progress.plain_line(run, 0.5) == "25%, about 9 s left"
+    assert progress.live_line(run, 0.5, 77) == " 25% 0:09 left"
+    assert progress.live_line(run, 0.5, 4) == " 25%"
+
+
 @pytest.mark.parametrize(
     ("rate", "words"), [(0.0, "-:-- left"), (1.0, "1:03 left"), (0.01, "1:45:00 left")]
 )

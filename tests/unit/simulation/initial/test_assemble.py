@@ -370,8 +370,9 @@ def test_redundancy_is_counted_and_the_joints_named(
     found = dap.compile(scene).redundancy()
     assert (found.rank.rows, found.rank.redundant, found.rank.dof) == (rows, redundant, dof)
     assert found.joints == joints
-    words = f"{redundant} of {rows} constraint rows are redundant" if redundant else "independent"
-    assert words in found.describe()
+    verb = "is" if redundant == 1 else "are"
+    words = f"{redundant} of {rows} constraint rows {verb} redundant"
+    assert (words if redundant else "independent") in found.describe()
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.02])
