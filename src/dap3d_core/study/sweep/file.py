@@ -5,7 +5,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,11 @@ from dap3d_core.study.sweep.dataset import (
     SweepLayout,
     Variable,
     check_format,
+    open_sweep,
 )
+
+if TYPE_CHECKING:
+    import xarray
 
 #: Seconds, and bytes of values, after which points are written.
 EVERY, MOST_WAITING = 2.0, 2**26
@@ -77,7 +81,7 @@ class SweepFile(GrowingFile):
         self._waiting: list[tuple[Integers, Batch]] = []
         self._is_empty = not resume
         self._due = time.monotonic() + EVERY
-        self._claim = FileLock(self.target)
+        self._claim, self._file = FileLock(self.target), self.part
         try:
             with NETCDF:
                 if resume:
@@ -119,6 +123,7 @@ class SweepFile(GrowingFile):
         with writing(self.part):
             write_checksums(self.part, WHOLE, is_whole=True)
         put_in_place(self.part, self.target, self._force)
+        self._file = self.target
         self._claim.release()
 
     def leave(self) -> None:
@@ -133,6 +138,14 @@ class SweepFile(GrowingFile):
                 self.part.unlink(missing_ok=True)
         finally:
             self._claim.release()
+
+    def dataset(self) -> "xarray.Dataset":
+        """Content of the file; of its part before it is complete.
+
+        Raises:
+            ResultError: it cannot be read.
+        """
+        return open_sweep(self._file)
 
     def _write(self, patience: float) -> None:
         """Writes all stored results to the disk.
