@@ -14,7 +14,7 @@ from dap3d_core.result.file.schema import about, attributes, new_variable
 from dap3d_core.result.post.force_output import DENSE_ROWS, rows_at
 from dap3d_core.result.quantities.catalogue import ACTIONS
 from dap3d_core.result.quantities.lookup import CONTACT_QUANTITIES, find, joint_coordinates
-from dap3d_core.result.quantities.xarray_dataset import add_outputs, dataset_of
+from dap3d_core.result.quantities.xarray_dataset import add_outputs, dataset_of, dimensions_of
 
 if TYPE_CHECKING:
     import xarray
@@ -167,12 +167,9 @@ def selection_of(result: "Result", names: Iterable[str]) -> "xarray.Dataset":
         quantity = find(result, name)
         if "/" in name:
             raise ResultError(f"a NetCDF file has no variable {name!r} with '/': write a .csv file")
-        dimensions = ["time"]
-        if quantity.values.ndim > 1:
-            dimension = {AXES: "axis", EULER: "euler"}.get(quantity.components, f"{name}_row")
-            dimensions.append(dimension)
-            if quantity.components in (AXES, EULER):
-                coordinates[dimension] = (dimension, list(quantity.components))
+        dimensions = dimensions_of(quantity)
+        if quantity.components in (AXES, EULER):
+            coordinates[dimensions[1]] = (dimensions[1], list(quantity.components))
         variables[name] = (dimensions, quantity.values, about(quantity.unit, quantity.label))
     return xarray.Dataset(variables, coordinates, attributes(result.summary, result.record))
 
