@@ -50,10 +50,6 @@ CAP_S = 5.0
 LIMIT_S = 30.0
 #: Expected duration of a rung, relative to the previous one.
 GROWTH = 1.6
-_STEP_LEFT_OUT = (
-    "the scene's step of {:g} s is left out where the integrator chooses its step; take it out of "
-    "the scene to run so"
-)
 
 
 @checked
@@ -111,8 +107,11 @@ def report(
     bench = Bench(used, limit_s=limit_s, allow_code=allow_code, announce=announce)
     rtols = tolerances or (QUICK_TOLERANCES if quick else TOLERANCES)
     maker = _Measurement(bench, chosen(methods, tuple(FORMULATIONS)), repeat, progress)
-    if given.simulation.step is not None:
-        maker.notes.append(_STEP_LEFT_OUT.format(given.simulation.step))
+    if (step := given.simulation.step) is not None:
+        maker.notes.append(
+            f"the scene's step of {step:g} s is left out where the integrator chooses its step; "
+            "take it out of the scene to run so"
+        )
     return maker.make(chosen(integrators, MEASURED), rtols, steps, target_error, quick=quick)
 
 
@@ -260,19 +259,16 @@ class _Measurement:
             else:
                 if not k:
                     self._once(rung.setting)
-                self._measure_one(rung, reference)
-
-    def _measure_one(self, rung: _Rung, reference: Reference) -> None:
-        result = self._once(rung.setting)
-        if isinstance(result, str):
-            rung.failed = result
-            return
-        rung.times.append(result.stats.wall_time_s)
-        u = result.u[: len(reference.t)]
-        rung.measures = measures_of(result) | {
-            "error": trajectory_error(u, reference.u),
-            "final_position_error": final_position_error(u, reference.u),
-        }
+                result = self._once(rung.setting)
+                if isinstance(result, str):
+                    rung.failed = result
+                    continue
+                rung.times.append(result.stats.wall_time_s)
+                u = result.u[: len(reference.t)]
+                rung.measures = measures_of(result) | {
+                    "error": trajectory_error(u, reference.u),
+                    "final_position_error": final_position_error(u, reference.u),
+                }
 
     def _time(self) -> None:
         """Further timings in turns, so that the noise of the machine affects all alike."""

@@ -326,6 +326,8 @@ class ModelRebuilder:
 
     def prepare(self, point: Floats) -> _RebuiltPoint | None:
         """A point as it starts; None where it cannot be run in a batch."""
+        from dap3d_core.model.element_states import tolerances
+
         evaluator = self._evaluator
         try:
             checked, model = self.load(point)
@@ -334,8 +336,10 @@ class ModelRebuilder:
             return None
         if start.redundancy.rank.rank != self._rank or not start.redundancy.is_plain:
             return None
-        if model.state_count and not self._has_same_tolerances(model):
-            return None
+        if model.state_count and not np.array_equal(
+            tolerances(model.acting), tolerances(self._compiled.model.acting)
+        ):
+            return None  # the integration has those of the scene as given
         if stops_of(checked, model, self._t_end) != self._stops:
             return None
         if not np.array_equal(model.input_values, self._compiled.model.input_values):
@@ -350,13 +354,6 @@ class ModelRebuilder:
         if self._structure_of(evaluator) != self._structure:
             return None
         return _RebuiltPoint(numbers_of(evaluator), y0, warnings)
-
-    def _has_same_tolerances(self, model: Model) -> bool:
-        """True if the states of elements have the tolerances of the integration."""
-        from dap3d_core.model.element_states import tolerances
-
-        given = tolerances(self._compiled.model.acting)
-        return np.array_equal(tolerances(model.acting), given)
 
     @staticmethod
     def _structure_of(evaluator: Evaluator) -> bytes:

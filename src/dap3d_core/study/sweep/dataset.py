@@ -299,17 +299,17 @@ def varied_of(data: "xarray.Dataset") -> dict[str, Any]:
 
 def is_sweep(path: str | os.PathLike[str]) -> bool:
     """True if the file exists and is that of a sweep."""
+
+    def has_points(file: Path) -> bool:
+        check_checksums(file)
+        with reading(file), opened(file) as dataset:
+            return SWEEP in dataset.ncattrs()
+
     try:
         check_signature(Path(path))
-        return bool(_patiently(Path(path), lambda file: SWEEP in _attributes_of(file)))
+        return _patiently(Path(path), has_points)
     except ResultError:
         return False
-
-
-def _attributes_of(file: Path) -> list[str]:
-    check_checksums(file)
-    with reading(file), opened(file) as dataset:
-        return list(dataset.ncattrs())
 
 
 def check_format(file: Path, dataset: Any) -> None:
