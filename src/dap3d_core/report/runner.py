@@ -50,6 +50,10 @@ CAP_S = 5.0
 LIMIT_S = 30.0
 #: Expected duration of a rung, relative to the previous one.
 GROWTH = 1.6
+_STEP_LEFT_OUT = (
+    "the scene's step of {:g} s is left out where the integrator chooses its step; take it out of "
+    "the scene to run so"
+)
 
 
 @checked
@@ -107,11 +111,8 @@ def report(
     bench = Bench(used, limit_s=limit_s, allow_code=allow_code, announce=announce)
     rtols = tolerances or (QUICK_TOLERANCES if quick else TOLERANCES)
     maker = _Measurement(bench, chosen(methods, tuple(FORMULATIONS)), repeat, progress)
-    if (step := given.simulation.step) is not None:
-        maker.notes.append(
-            f"the scene's step of {step:g} s is left out where the integrator chooses its step; "
-            "take it out of the scene to run so"
-        )
+    if given.simulation.step is not None:
+        maker.notes.append(_STEP_LEFT_OUT.format(given.simulation.step))
     return maker.make(chosen(integrators, MEASURED), rtols, steps, target_error, quick=quick)
 
 
