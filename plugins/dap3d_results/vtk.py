@@ -15,7 +15,7 @@ from dap3d_core.interface.formats import Exporter, ResultExporter, hookimpl
 from dap3d_core.model.groups import Floats
 from dap3d_core.model.rotations import rotation
 from dap3d_core.result import ResultError
-from dap3d_core.result.file.library import created, guarded
+from dap3d_core.result.file.library import created
 from dap3d_core.view.scene3d.primitives import LAYERS
 from dap3d_core.view.scene3d.shapes import Line, Part
 from dap3d_results.moving_solids import MovingScene, rgb
@@ -59,7 +59,7 @@ def write_vtkhdf(scene: MovingScene, path: Path, progress: Progress | None = Non
         ResultError: the file cannot be written.
     """
     with created(path, path) as file:
-        guarded(path, lambda: _fill(file, scene, progress))
+        _fill(file, scene, progress)
 
 
 def point_count(scene: MovingScene) -> int:

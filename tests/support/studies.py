@@ -10,6 +10,18 @@ _random = np.random.default_rng(1)
 POINTS = np.column_stack([_random.uniform(0.5, 2.0, 200), _random.uniform(-2.0, 2.0, 200)])
 
 
+#: Rest length and start of the spring below, m.
+LENGTH, START = 1.0, 1.25
+
+
+def spring(mass=1.0, k=4.0):
+    """A block on a spring along x, without weight."""
+    scene = dap.Scene(name="spring")
+    scene.add_body("block", mass=mass, Jp=(1.0, 1.0, 1.0), r=(START, 0.0, 0.0))
+    scene.add_force("ptp", "spring", P_i="block.O", P_j="ground.O", k=k, l0=LENGTH)
+    return scene
+
+
 def pendulum():
     """A bob on a hinge with a spring, whose stiffness sets the number of steps."""
     scene = dap.Scene(name="pendulum")

@@ -168,7 +168,11 @@ class CurvePicture(style.Picture):
         for axis in (ax.xaxis, ax.yaxis):
             axis.set_major_formatter(style.PlainOffset())
         style.show_rounding_flat(ax, max(curve.span for curve in curves))
-        ax.set_ylabel(style.folded(_y_label(unit, curves), 15 * height), fontsize=style.LETTERS)
+        labels = list(dict.fromkeys(c.quantity.label for c in curves))
+        kinds = list(dict.fromkeys(c.quantity.kind for c in curves))
+        words = labels[0] if len(labels) == 1 else ", ".join(kinds) if len(kinds) < 3 else ""
+        label = style.with_unit(words + (curves[0].drift if len(curves) == 1 else ""), unit)
+        ax.set_ylabel(style.folded(label, 15 * height), fontsize=style.LETTERS)
 
     def _marks(self, curve: Curve, start: str) -> dict[str, Any]:
         """Dots at the instants of a curve over time where these are few; else one at a start."""
@@ -177,13 +181,6 @@ class CurvePicture(style.Picture):
         seen = self.x.name != "t" or len(curve.instants) == 1
         return {"marker": start if seen else "", "markevery": [0], "markersize": 4.5,
                 "markerfacecolor": "none"}  # fmt: skip
-
-
-def _y_label(unit: str, curves: Sequence[Curve]) -> str:
-    labels = list(dict.fromkeys(c.quantity.label for c in curves))
-    kinds = list(dict.fromkeys(c.quantity.kind for c in curves))
-    words = labels[0] if len(labels) == 1 else ", ".join(kinds) if len(kinds) < 3 else ""
-    return style.with_unit(words + (curves[0].drift if len(curves) == 1 else ""), unit)
 
 
 def curve_picture(

@@ -202,14 +202,14 @@ def show_plot(
     pyplot.close(figure)
 
 
+@attrs.frozen(eq=False)
 class EigenvaluePicture(style.OnePanel):
     """The eigenvalues of a linearisation.
 
     Modes have their numbers; those that grow are drawn as crosses, to the right of the axis.
     """
 
-    def __init__(self, linearization: "Linearization") -> None:
-        self.linearization = linearization
+    linearization: "Linearization"
 
     def draw_on(self, ax: Axes) -> Axes:
         """Draw on axes of the user."""
@@ -228,9 +228,7 @@ class EigenvaluePicture(style.OnePanel):
         if not np.any(real):
             ax.set_xlim(-size, size)
         ax.margins(0.12)
-        ax.set_xlabel("real part [1/s]", fontsize=style.LETTERS)
-        ax.set_ylabel("imaginary part [rad/s]", fontsize=style.LETTERS)
-        style.style_axes(ax)
+        style.style_axes(ax, style.REAL_PART, style.IMAGINARY_PART)
         return ax
 
 
@@ -321,10 +319,8 @@ class EquilibriumPathPicture(style.Picture):
         for axis in (ax.xaxis, ax.yaxis):
             axis.set_major_formatter(style.PlainOffset())
         style.show_rounding_flat(ax)
-        ax.set_xlabel(style.with_unit(path.parameter, path.unit), fontsize=style.LETTERS)
-        label = style.with_unit(panel.label, panel.unit)
-        ax.set_ylabel(style.folded(label, 15 * height), fontsize=style.LETTERS)
-        style.style_axes(ax)
+        label = style.folded(style.with_unit(panel.label, panel.unit), 15 * height)
+        style.style_axes(ax, style.with_unit(path.parameter, path.unit), label)
 
 
 def _panel(path: "EquilibriumPath", name: str) -> Panel:
@@ -394,16 +390,13 @@ class FitPicture(style.Picture):
         for name, above, below in zip(self.outputs, axes[::2], axes[1::2], strict=True):
             self._draw_output(name, above, below)
             for ax in (above, below):
-                style.style_axes(ax)
                 ax.yaxis.set_major_formatter(style.PlainOffset())
                 ax.ticklabel_format(axis="y", scilimits=(-3, 4))
         style.legend_above(axes[0], ("measured", "fitted"), figure.get_figwidth())
         axes[-1].set_xlabel("time [s]", fontsize=style.LETTERS)
         figure.align_ylabels(axes)
-        if self.fit.result.record.title:
-            figure.suptitle(
-                style.shown_text(self.fit.result.record.title), fontsize=style.LETTERS + 1
-            )
+        if title := self.fit.result.record.title:
+            figure.suptitle(style.shown_text(title), fontsize=style.LETTERS + 1)
         return list(axes)
 
     def _draw_output(self, name: str, above: Axes, below: Axes) -> None:
@@ -415,20 +408,21 @@ class FitPicture(style.Picture):
         above.plot(fit.t, fit.measured[name], label="measured", **marks)
         above.plot(*points, color=style.PALETTE[0], linewidth=1.2, label="fitted")
         label = style.folded(style.with_unit(curve.label, curve.unit), 15 * CURVE_HEIGHT)
-        above.set_ylabel(label, fontsize=style.LETTERS)
+        style.style_axes(above, y_label=label)
         sigma, residuals = fit.sigma.get(name), fit.residuals[name]
         if sigma is None:
             below.plot(fit.t, residuals, **marks)
         else:
             below.errorbar(fit.t, residuals, sigma, elinewidth=0.5, **marks)
         below.axhline(0.0, color=style.PALETTE[0], linewidth=1.0)
-        below.set_ylabel(f"residual\n{style.unit_text(curve.unit)}", fontsize=style.LETTERS)
+        style.style_axes(below, y_label=f"residual\n{style.unit_text(curve.unit)}")
         reach = np.abs(residuals) + (0.0 if sigma is None else sigma)
         if (reach > 0.0).any():
             limit = 1.15 * np.nanmax(reach)
             below.set_ylim(-limit, limit)
 
 
+@attrs.frozen(eq=False)
 class SensitivityPicture(style.Picture):
     """For each quantity its elasticities at the end, and p dq/dp over time.
 
@@ -439,8 +433,8 @@ class SensitivityPicture(style.Picture):
 
     refusal = "sensitivities have several panels: leave ax out"
 
-    def __init__(self, sensitivities: "Sensitivities", quantities: tuple[str, ...]) -> None:
-        self.sensitivities, self.quantities = sensitivities, quantities
+    sensitivities: "Sensitivities"
+    quantities: tuple[str, ...]
 
     @property
     def height(self) -> float:
@@ -457,12 +451,8 @@ class SensitivityPicture(style.Picture):
             bars.barh(list(found.names), elasticities, color=colors)
             bars.invert_yaxis()
             bars.axvline(0.0, color="0.5", linewidth=0.8)
-            bars.set_xlabel(f"% of {quantity} by 1 %", fontsize=style.LETTERS)
+            style.style_axes(bars, f"% of {quantity} by 1 %")
             for k, curve in enumerate((found.of(quantity) * found.values).T):
                 curves.plot(found.result.t, curve, color=colors[k], linewidth=1.2)
-            curves.set_xlabel("t [s]", fontsize=style.LETTERS)
-            curves.set_ylabel(f"p d {quantity} / dp", fontsize=style.LETTERS)
-        axes = [one for row in panels for one in row]
-        for one in axes:
-            style.style_axes(one)
-        return axes
+            style.style_axes(curves, "t [s]", f"p d {quantity} / dp")
+        return list(panels.flat)

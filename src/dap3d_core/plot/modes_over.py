@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+import attrs
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
@@ -25,9 +26,6 @@ FREQUENCIES, EIGENVALUES = "frequencies", "eigenvalues"
 #: Points of a curve on which a pair meets the real axis.
 MEETING = 24
 
-#: Quarter turns have ticks of the phase.
-QUARTER = 90.0
-
 
 def modes_over_picture(
     modes: "ModesOver", names: Sequence[str], x: str | None, at: Mapping[str, float] | None
@@ -41,11 +39,11 @@ def modes_over_picture(
     return RootLocusPicture(modes) if EIGENVALUES in names else ModesOverPicture(modes)
 
 
+@attrs.frozen(eq=False)
 class ModesOverPicture(style.OnePanel):
     """Frequency of each mode over the parameter; crosses where its motion grows."""
 
-    def __init__(self, modes: "ModesOver") -> None:
-        self.modes = modes
+    modes: "ModesOver"
 
     def draw_on(self, ax: Axes) -> Axes:
         """Draw on axes of the user."""
@@ -60,12 +58,11 @@ class ModesOverPicture(style.OnePanel):
                     label="grows")  # fmt: skip
             ax.legend(fontsize=style.LETTERS, frameon=False)
         ax.set_ylim(bottom=0.0)
-        ax.set_xlabel(style.with_unit(found.parameter, found.unit), fontsize=style.LETTERS)
-        ax.set_ylabel("frequency [Hz]", fontsize=style.LETTERS)
-        style.style_axes(ax)
+        style.style_axes(ax, style.with_unit(found.parameter, found.unit), "frequency [Hz]")
         return ax
 
 
+@attrs.frozen(eq=False)
 class RootLocusPicture(style.OnePanel):
     """Eigenvalues in the complex plane, coloured by the parameter.
 
@@ -73,8 +70,7 @@ class RootLocusPicture(style.OnePanel):
     side.
     """
 
-    def __init__(self, modes: "ModesOver") -> None:
-        self.modes = modes
+    modes: "ModesOver"
 
     def draw(self, figure: Figure) -> list[Axes]:
         """Draw on an empty figure."""
@@ -121,9 +117,7 @@ class RootLocusPicture(style.OnePanel):
         if right > 0.0:
             ax.axvspan(0.0, right, color=GROWS, alpha=0.08, linewidth=0.0, zorder=0)
             ax.set_xlim(left, right)
-        ax.set_xlabel("real part [1/s]", fontsize=style.LETTERS)
-        ax.set_ylabel("imaginary part [rad/s]", fontsize=style.LETTERS)
-        style.style_axes(ax)
+        style.style_axes(ax, style.REAL_PART, style.IMAGINARY_PART)
         return lines
 
 
@@ -175,6 +169,7 @@ def _meeting(pair: complex, reals: "Complex") -> tuple[Floats, list["Complex"]]:
     return parts, [mean + root, mean - root]
 
 
+@attrs.frozen(eq=False)
 class BodePicture(style.Picture):
     """Gain and phase of each output over each input, on logarithmic axes.
 
@@ -186,15 +181,10 @@ class BodePicture(style.Picture):
 
     refusal = "a frequency response has two panels, gain and phase: leave ax out"
 
-    def __init__(
-        self,
-        frequencies: Floats,
-        response: NDArray[np.complex128],
-        inputs: tuple[str, ...],
-        outputs: tuple[str, ...],
-    ) -> None:
-        self.frequencies, self.response = frequencies, response
-        self.inputs, self.outputs = inputs, outputs
+    frequencies: Floats
+    response: NDArray[np.complex128]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
 
     @property
     def height(self) -> float:
@@ -220,13 +210,10 @@ class BodePicture(style.Picture):
         gain.set_xscale("log")
         if np.any(np.abs(self.response[np.isfinite(self.response)]) > 0.0):
             gain.set_yscale("log")
-        gain.set_ylabel("gain", fontsize=style.LETTERS)
-        phase.set_ylabel("phase [deg]", fontsize=style.LETTERS)
-        phase.set_xlabel("frequency [Hz]", fontsize=style.LETTERS)
         low, high = phase.get_ylim()
-        if high - low > QUARTER:
-            phase.set_yticks(np.arange(np.ceil(low / QUARTER), high / QUARTER) * QUARTER)
-        for axes in (gain, phase):
-            style.style_axes(axes)
+        if high - low > 90.0:  # ticks at quarter turns
+            phase.set_yticks(np.arange(np.ceil(low / 90.0), high / 90.0) * 90.0)
+        style.style_axes(gain, y_label="gain")
+        style.style_axes(phase, "frequency [Hz]", "phase [deg]")
         gain.legend(fontsize=style.LETTERS, frameon=False)
         return [gain, phase]

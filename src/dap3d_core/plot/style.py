@@ -18,11 +18,11 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 #: Inches. Letters of 8 points are still 5 points high where the picture is set 60 mm wide.
 WIDTH, HEIGHT, PANEL_HEIGHT = 3.8, 2.9, 2.1
 LETTERS = 8.0
-#: A range below this fraction of the values is their rounding.
-RANGE_ROUNDING = 1e-12
 #: A real part below this part of the largest magnitude is drawn as zero.
 REAL_PART_ROUNDING = 1e-9
 MINUS = "\N{MINUS SIGN}"
+#: Labels of the complex plane of eigenvalues.
+REAL_PART, IMAGINARY_PART = "real part [1/s]", "imaginary part [rad/s]"
 #: Offsets as matplotlib writes them: 1e-9+4.3e1.
 _OFFSET = re.compile(r"(?:1e(-?\d+))?([+-]\d[^+]*)?")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -79,15 +79,21 @@ def show_rounding_flat(ax: Axes, span: float = 0.0) -> None:
     """
     low, high = ax.dataLim.intervaly
     size = max(abs(low), abs(high))
-    if 0.0 < high - low < RANGE_ROUNDING * size:
+    if 0.0 < high - low < 1e-12 * size:
         span = max(span, 0.2 * size)
     if high - low < span:
         middle = 0.5 * (low + high)
         ax.set_ylim(middle - 0.55 * span, middle + 0.55 * span)
 
 
-def style_axes(ax: Axes, *, grid: bool = True) -> None:
-    """Set sizes of letters, a pale grid, and no frame above and to the right."""
+def style_axes(
+    ax: Axes, x_label: str | None = None, y_label: str | None = None, *, grid: bool = True
+) -> None:
+    """Set labels, sizes of letters, a pale grid, and no frame above and to the right."""
+    if x_label is not None:
+        ax.set_xlabel(x_label, fontsize=LETTERS)
+    if y_label is not None:
+        ax.set_ylabel(y_label, fontsize=LETTERS)
     ax.tick_params(labelsize=LETTERS)
     for offset in (ax.xaxis.get_offset_text(), ax.yaxis.get_offset_text()):
         offset.set_fontsize(LETTERS)

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -58,10 +59,7 @@ def save_work_precision(
     drawn = [mark for mark in marks if mark.error > 0.0 and mark.time_s > 0.0]
     if not drawn:
         raise ValueError("there is no run with an error above zero to draw")
-
-    def paint(figure: Figure) -> None:
-        draw_work_precision(figure, drawn, title, uncertainty)
-
+    paint = partial(draw_work_precision, marks=drawn, title=title, uncertainty=uncertainty)
     return save_figure(paint, Path(path), (width, height), dpi, force=force)
 
 
@@ -88,9 +86,7 @@ def draw_work_precision(
         low, high = ax.get_xlim()
         ax.axvspan(min(low, uncertainty), uncertainty, color=BAND, zorder=0)
         ax.set_xlim(low, high)
-    ax.set_xlabel("error e", fontsize=style.LETTERS)
-    ax.set_ylabel("wall time", fontsize=style.LETTERS)
-    style.style_axes(ax)
+    style.style_axes(ax, "error e", "wall time")
     keys = [Line2D([], [], color=style.PALETTE[i % len(style.PALETTE)], linewidth=2.5, label=name)
             for i, name in enumerate(integrators)]  # fmt: skip
     keys += [Line2D([], [], **(_line_style(0, j) | {"color": "0.25"}), label=name)

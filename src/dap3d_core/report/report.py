@@ -44,12 +44,8 @@ class Recommendation:
 
     def to_dict(self) -> dict[str, Any]:
         """The recommendation in JSON."""
-        return {
-            "target_error": self.target_error,
-            "run": None if self.run is None else self.run.to_dict(),
-            "reason": self.reason,
-            "flags": self.flags,
-        }
+        run = None if self.run is None else self.run.to_dict()
+        return attrs.asdict(self, recurse=False) | {"run": run}
 
 
 #: Columns of the table that are not counts.

@@ -260,19 +260,16 @@ class _Measurement:
             else:
                 if not k:
                     self._once(rung.setting)
-                self._measure_one(rung, reference)
-
-    def _measure_one(self, rung: _Rung, reference: Reference) -> None:
-        result = self._once(rung.setting)
-        if isinstance(result, str):
-            rung.failed = result
-            return
-        rung.times.append(result.stats.wall_time_s)
-        u = result.u[: len(reference.t)]
-        rung.measures = measures_of(result) | {
-            "error": trajectory_error(u, reference.u),
-            "final_position_error": final_position_error(u, reference.u),
-        }
+                result = self._once(rung.setting)
+                if isinstance(result, str):
+                    rung.failed = result
+                    continue
+                rung.times.append(result.stats.wall_time_s)
+                u = result.u[: len(reference.t)]
+                rung.measures = measures_of(result) | {
+                    "error": trajectory_error(u, reference.u),
+                    "final_position_error": final_position_error(u, reference.u),
+                }
 
     def _time(self) -> None:
         """Further timings in turns, so that the noise of the machine affects all alike."""

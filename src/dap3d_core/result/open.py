@@ -114,8 +114,11 @@ def _read(dataset: Any) -> tuple[ModelSummary, RunMetadata, int]:
     check_subject(summary)
     count = len(dataset.dimensions["time"])
     if record.status == RUNNING:
-        count = _complete_count(dataset, count)
-        record = _interrupted(dataset, record, count)
+        count, last = _complete_count(dataset, count), "nothing was reported"
+        if count:
+            last = f"the last instant is t = {float(dataset.variables['t'][count - 1]):g} s"
+        note = f"the run was killed, or is still being written: {last}"
+        record = attrs.evolve(record, status="interrupted", notes=(*record.notes, note))
     return summary, record, count
 
 
@@ -149,15 +152,6 @@ def _complete_count(dataset: Any, count: int) -> int:
         return 0
     rising = t[1:] > t[:-1]
     return 1 + (len(rising) if rising.all() else int(np.argmin(rising)))
-
-
-def _interrupted(dataset: Any, record: RunMetadata, count: int) -> RunMetadata:
-    """The record of a run with a killed writer."""
-    last = "nothing was reported"
-    if count:
-        last = f"the last instant is t = {float(dataset.variables['t'][count - 1]):g} s"
-    note = f"the run was killed, or is still being written: {last}"
-    return attrs.evolve(record, status="interrupted", notes=(*record.notes, note))
 
 
 def _origin(

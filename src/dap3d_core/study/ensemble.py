@@ -162,10 +162,7 @@ class Ensemble:
 
     def result(self, point: Sequence[float]) -> Result:
         """The whole result of one point, as ``simulate`` gives it; errors as of that."""
-        return self._result(self.requested.scene, point)
-
-    def _result(self, scene: Scene, point: Sequence[float]) -> Result:
-        return simulate(self._model(scene, point))
+        return simulate(self._model(self.requested.scene, point))
 
     def _model(self, scene: Scene, point: Sequence[float]) -> CompiledModel:
         changed = with_values(scene, self.parameters, point)
@@ -204,7 +201,7 @@ class Ensemble:
             if self.study.gradients:
                 result = self._with_derivatives(k, point, batch)
             else:
-                result = self._result(self.study.scene, point.tolist())
+                result = simulate(self._model(self.study.scene, point.tolist()))
             status, note = PointStatus.DONE, self._note(result)
         except (SceneError, SimulationError) as error:
             result = Computed.of(error).result

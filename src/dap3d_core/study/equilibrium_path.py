@@ -270,25 +270,20 @@ def _path_notes(path: EquilibriumPath, numbers: Floats) -> list[str]:
         "the parameter does not turn; a start aside leads to that path"
         for value in path.values[path.branching]
     ]
-    return notes + _end_notes(path, numbers, name, last)
-
-
-def _end_notes(path: EquilibriumPath, numbers: Floats, name: str, last: str) -> list[str]:
     if path.end == "returned":
-        return [
-            information(
-                f"the path turns before {name} = {numbers[-1]:g}, and ends at {last} "
-                "again; values that begin beyond it follow the path further"
-            )
-        ]
-    if path.end == "stuck":
-        return [
+        what = (
+            f"the path turns before {name} = {numbers[-1]:g}, and ends at {last} again; values "
+            "that begin beyond it follow the path further"
+        )
+        notes.append(information(what))
+    elif path.end == "stuck":
+        notes.append(
             f"the path ends at {name} = {last}: no step goes on there. Forces may jump, joints may "
             "come to the end of their reach, or another path may cross"
-        ]
-    if path.end == "long":
-        return [f"the path was followed for {len(path.values)} points, to {name} = {last}"]
-    return []
+        )
+    elif path.end == "long":
+        notes.append(f"the path was followed for {len(path.values)} points, to {name} = {last}")
+    return notes
 
 
 class _Family:
@@ -326,10 +321,6 @@ class _Family:
         """The scene at a part of the range."""
         return with_values(self._compiled.scene, [self.parameter], [self.value_of(s)])
 
-    def load(self, s: float, point: PathPoint) -> None:
-        """Evaluate the model of a point from here on."""
-        self.statics.load(s, point)
-
     def _build(self, s: float) -> Model:
         return build_model(check(self.scene(s), self._own.registry))
 
@@ -354,12 +345,12 @@ class _Family:
         """Whether a point is stable: at a turning point the potential has no minimum."""
         if point.kind is Kind.TURNING:
             return False
-        self.load(point.s, point)
+        self.statics.load(point.s, point)
         return stability_of(self.statics.statics, point.pose).stable
 
     def row(self, point: PathPoint) -> Floats:
         """A row of a result at rest at a point."""
-        self.load(point.s, point)
+        self.statics.load(point.s, point)
         evaluator, u = self.evaluator, point.pose.u
         layout = evaluator.model.report_layout
         report = evaluator.report(0.0, u)
@@ -370,14 +361,14 @@ class _Family:
     def quantity(self, name: str, points: list[PathPoint], rows: Floats) -> Quantity:
         """A quantity of points with their rows (k, ...)."""
         reduction = Reduction(self._compiled, [self.parameter], [])
-        self.load(points[0].s, points[0])
+        self.statics.load(points[0].s, points[0])
         quantity = find(reduction.result(self.evaluator.model, rows, self.evaluator), name)
         reduction = Reduction(self._compiled, [self.parameter], [Output(name, name)])
         if all(reduction.of_rows.values()):
             return quantity
         values = []
         for point, row in zip(points, rows, strict=True):
-            self.load(point.s, point)
+            self.statics.load(point.s, point)
             value = [self.value_of(point.s)]
             one = reduction.result(self.evaluator.model, row[None], self.evaluator, value)
             values.append(one.quantity(name).values[0])

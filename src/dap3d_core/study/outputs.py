@@ -149,6 +149,11 @@ def _output(label: Any, of: Any) -> Output | Mistake:
     return Mistake("outputs", of, what, f"{quantity}:{near}" if near else "")
 
 
+def unknown_quantity(key: str, value: str, error: UnknownNameError | ResultError) -> Mistake:
+    """The mistake of a value that names no quantity, with the nearest."""
+    return Mistake(key, value, str(error.args[0]), getattr(error, "nearest", ""))
+
+
 def _moves_joints(parameter: SceneParameter) -> bool:
     """True if joints may have other axes, points or poses in the scene with another value."""
     if parameter.table == "bodies":
@@ -243,9 +248,7 @@ class Reduction:
                 try:
                     quantity = find(probe, output.of)
                 except (UnknownNameError, ResultError) as error:
-                    near = getattr(error, "nearest", "")
-                    what = str(error.args[0] if error.args else error)
-                    mistakes.append(Mistake("outputs", output.name, what, near))
+                    mistakes.append(unknown_quantity("outputs", output.name, error))
                     continue
                 components = output.components(quantity.components)
                 label, unit = quantity.label, quantity.unit

@@ -104,13 +104,16 @@ def with_values(
     return changed
 
 
-def parameters_named(checked: ValidatedScene, names: Sequence[str]) -> tuple[SceneParameter, ...]:
+def parameters_named(
+    checked: ValidatedScene, names: Sequence[str], key: str = "vary"
+) -> tuple[SceneParameter, ...]:
     """Parameters of a scene by name.
 
     Args:
         checked: the scene.
         names: ``TABLE.NAME.FIELD``, ``simulation.FIELD``, ``parameters.NAME``; a component follows
             after a further dot: x, y, z, for Euler parameters e0 to e3, or its index, from 1.
+        key: the argument that names them, for the mistakes.
 
     Raises:
         SceneError: unknown names, with the nearest; a parameter that is named twice.
@@ -128,7 +131,7 @@ def parameters_named(checked: ValidatedScene, names: Sequence[str]) -> tuple[Sce
             mistakes.append(Mistake("vary", name, f"{alias}a number is varied only once"))
         parameters.append(parameter)
     if mistakes:
-        raise SceneError(mistakes)
+        raise SceneError([attrs.evolve(mistake, key=key) for mistake in mistakes])
     return tuple(parameters)
 
 
@@ -366,9 +369,9 @@ def read_values(own: ValidatedScene, name: str, values: Any) -> tuple[SceneParam
         raise SceneError([Mistake("values", values, f"values are {FORMS}")])
     mistakes: list[Mistake] = []
     try:
-        [parameter] = parameters_named(own, [name])
+        [parameter] = parameters_named(own, [name], "parameter")
     except SceneError as error:
-        mistakes += [attrs.evolve(m, key="parameter") for m in error.mistakes]
+        mistakes += error.mistakes
     try:
         numbers = design_of({name: values}, None, "lhs", 0).varied[0].values
     except SceneError as error:  # samples have no order to follow

@@ -45,8 +45,27 @@ class View:
 
     @property
     def html(self) -> str:
-        """The page."""
-        return _page(self.data)
+        """The page: the template with everything put in."""
+        data = self.data
+        program = "\n".join(_text_of(f"assets/js/{part}.js") for part in PROGRAM)
+        style, three = _text_of("assets/view.css"), _text_of("vendor/three.min.js")
+        try:
+            text = json.dumps(data, separators=(",", ":"), allow_nan=False)
+        except ValueError:  # no run of ours leaves such a result
+            raise ResultError(
+                "the result holds numbers that are not finite: no page shows it"
+            ) from None
+        parts = {
+            "title": html.escape(self.title),
+            "scripts": f"{_hash(three)} {_hash(program)}",
+            "styles": _hash(style),
+            "style": style,
+            "licence": html.escape(_text_of("vendor/LICENSE").strip()),
+            "three": three,
+            "data": text.replace("<", "\\u003c"),
+            "program": program,
+        }
+        return _filled(_text_of("assets/page.html"), parts)
 
     def save(self, path: str | os.PathLike[str], force: bool = False) -> Path:
         """Write the page to a file, whole or not at all; returns the path.
@@ -113,31 +132,8 @@ def view(
     return View(data | {"play": play})
 
 
-def _page(data: dict[str, Any]) -> str:
-    """The template with everything put in."""
-
-    def text_of(name: str) -> str:
-        return (files("dap3d_core.view") / name).read_text(encoding="utf-8")
-
-    program = "\n".join(text_of(f"assets/js/{part}.js") for part in PROGRAM)
-    style, three = text_of("assets/view.css"), text_of("vendor/three.min.js")
-    try:
-        text = json.dumps(data, separators=(",", ":"), allow_nan=False)
-    except ValueError:  # no run of ours leaves such a result
-        raise ResultError(
-            "the result holds numbers that are not finite: no page shows it"
-        ) from None
-    parts = {
-        "title": html.escape(str(data["about"]["title"])),
-        "scripts": f"{_hash(three)} {_hash(program)}",
-        "styles": _hash(style),
-        "style": style,
-        "licence": html.escape(text_of("vendor/LICENSE").strip()),
-        "three": three,
-        "data": text.replace("<", "\\u003c"),
-        "program": program,
-    }
-    return _filled(text_of("assets/page.html"), parts)
+def _text_of(name: str) -> str:
+    return (files("dap3d_core.view") / name).read_text(encoding="utf-8")
 
 
 def _hash(text: str) -> str:

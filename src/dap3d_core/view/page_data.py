@@ -17,8 +17,6 @@ from dap3d_core.view.scene3d.primitives import pack
 from dap3d_core.view.scene3d.sampled_motion import Motion, at_instants, instants_to_show
 from dap3d_core.view.scene3d.scene_data import geometry_of
 
-#: Curves that every page can draw besides those derived from motion and reactions.
-USUAL = ("energy.kinetic", "energy.potential", "energy.total")
 #: An arrow below this fraction of the largest of its kind is left out.
 SMALLEST = 1e-9
 #: Greatest lengths of the longest arrow and of the usual one, as fractions of the scene's size.
@@ -56,7 +54,8 @@ def page_data(
     if len(index) < len(result.t):
         notes.append(f"{len(index)} of {len(result.t)} reported instants are on this page")
     outputs = (output.name for output in available_outputs(shown))
-    names = dict.fromkeys((*USUAL, *outputs, *quantities))
+    energies = (f"energy.{part}" for part in ("kinetic", "potential", "total"))
+    names = dict.fromkeys((*energies, *outputs, *quantities))
     return {
         "instants": len(index),
         "t": pack(shown.t, "<f8"),

@@ -10,12 +10,11 @@ import attrs
 import numpy as np
 
 from dap3d_core.result import Computed, Result, ResultError, UnknownNameError, find
-from dap3d_core.result.file.schema import SWEEP
 from dap3d_core.scene import Mistake, SceneError, load, parse
 from dap3d_core.simulation import CompiledModel, SimulationError, simulate
 from dap3d_core.simulation.output.type_sources import digests_of
 from dap3d_core.study import REDUCTIONS, PointStatus, SceneParameter, parameters_named, with_values
-from dap3d_core.study.sweep.dataset import at_places, evenly
+from dap3d_core.study.sweep.dataset import at_places, evenly, varied_of
 from dap3d_core.view.page_data import page_data
 from dap3d_core.view.scene3d.sampled_motion import Extent, stage
 
@@ -66,7 +65,11 @@ class SweepPoints:
     @classmethod
     def of(cls, data: "xarray.Dataset", most: int) -> "SweepPoints":
         """So many points at most, evenly chosen along each axis, with the first and the last."""
-        names, sampled = _names(data), "point" in data.dims
+        names, sampled = tuple(varied_of(data)), "point" in data.dims
+        missing = [name for name in names if name not in data.coords]
+        if missing:
+            what = f"the data set has no values of {missing[0]}: no point can be run again"
+            raise ValueError(what)
         axes = ["point"] if sampled else [n for n in names if n in data.dims]
         sizes = [data.sizes[axis] for axis in axes]
         index = dict(zip(axes, evenly(sizes, most), strict=True))
@@ -92,23 +95,6 @@ class SweepPoints:
         """The data sets of the single points, the last axis fastest."""
         for index in np.ndindex(*self.shape):
             yield self.data.isel(dict(zip(self.axes, index, strict=True)))
-
-
-def _names(data: "xarray.Dataset") -> tuple[str, ...]:
-    """Names of the numbers that vary."""
-    if SWEEP not in data.attrs:
-        raise ValueError(
-            f"the data set is of no sweep: it has no attribute {SWEEP}; dap.sweep and "
-            "dap.open_sweep give one"
-        )
-    try:
-        names = tuple(str(one["name"]) for one in json.loads(data.attrs["varied"]))
-    except (KeyError, TypeError, ValueError) as error:
-        raise ValueError(f"the sweep does not say what varies: {error}") from error
-    missing = [name for name in names if name not in data.coords]
-    if missing:
-        raise ValueError(f"the data set has no values of {missing[0]}: no point can be run again")
-    return names
 
 
 class SweepRuns:

@@ -6,24 +6,16 @@ import json
 import numpy as np
 import pytest
 from support.plain import jit_is_on
+from support.studies import LENGTH, START, spring
 
 import dap3d_core as dap
 from dap3d_core.view import sweep_page
 
 #: Rest length and start of the spring below, m.
-LENGTH, START = 1.0, 1.25
 MASS, K = "bodies.block.mass", "forces.spring.k"
 TIMES = {"t_end": 0.2, "dt": 0.05}
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="runs many points; compiled elsewhere")
-
-
-def spring():
-    """A block on a spring along x, without weight."""
-    scene = dap.Scene(name="spring")
-    scene.add_body("block", mass=1.0, Jp=(1.0, 1.0, 1.0), r=(START, 0.0, 0.0))
-    scene.add_force("ptp", "spring", P_i="block.O", P_j="ground.O", k=4.0, l0=LENGTH)
-    return scene
 
 
 def swept(vary, outputs=("block.r.x:min",), **options):

@@ -47,8 +47,6 @@ NO_FFMPEG = (
 )
 #: Colours of a GIF; lines at any angle need shades between theirs and white.
 COLORS = 128
-#: Parts of a colour from here on are as bright as can be.
-PALEST = 248
 
 Frames = Iterator[Any]
 
@@ -68,7 +66,7 @@ def _write_gif(part: Path, frames: Frames, fps: float) -> None:
     first = Image.fromarray(next(frames)).convert("RGB")
     palette = first.quantize(COLORS, method=Image.Quantize.MEDIANCUT, dither=none)
     # The means of pale shades fall short of white, and colours are looked up in steps of 8.
-    palette.putpalette([s if s < PALEST else 255 for s in palette.getpalette() or []])
+    palette.putpalette([s if s < 248 else 255 for s in palette.getpalette() or []])
     rest = (Image.fromarray(f).convert("RGB").quantize(palette=palette, dither=none)
             for f in frames)  # fmt: skip
     with part.open("wb") as file:

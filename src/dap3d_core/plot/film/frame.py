@@ -17,7 +17,7 @@ from dap3d_core.plot.film.projection import (
     Camera,
     fill_limits,
     floor_grid,
-    grid_spacing,
+    round_number,
 )
 from dap3d_core.plot.film.stick_figure import Sticks
 from dap3d_core.plot.style import LETTERS, WIDTH, columns_of, shown_text
@@ -181,7 +181,8 @@ class Stage:
 
     def _draw_floor(self) -> None:
         """The grid on the floor, the text of its spacing, and the directions of the axes."""
-        spacing = grid_spacing(self.limits)
+        # some four to ten lines
+        spacing = round_number(float(np.max(self.limits[:2, 1] - self.limits[:2, 0])) / 6.0)
         lines = self.camera.project(floor_grid(self.limits, spacing))
         self.ax.add_collection(
             LineCollection(list(lines), colors=GRID, linewidths=0.7, zorder=0), autolim=False

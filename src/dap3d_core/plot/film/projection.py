@@ -126,11 +126,6 @@ def fill_limits(rectangle: Floats, width: float, height: float) -> Floats:
     return np.stack([middle - half, middle + half], axis=1)
 
 
-def grid_spacing(limits: Floats) -> float:
-    """A round distance, m, of some four to ten lines on the floor of a box (3, 2)."""
-    return round_number(float(np.max(limits[:2, 1] - limits[:2, 0])) / 6.0)
-
-
 def round_number(x: float) -> float:
     """The number of the row ..., 0.5, 1, 2, 5, 10, ... nearest to x > 0."""
     power = 10.0 ** np.floor(np.log10(x))

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
+from itertools import count, pairwise
 from typing import Any
 
 import attrs
@@ -45,6 +45,16 @@ LONGEST = 0.12
 DARKEST, OBLIQUE = 0.55, (0.3, 0.5)
 
 
+def _placed(body: Integers, local: Floats, r: Floats, p: Floats) -> Floats:
+    """Positions (..., k, 3), m, of places in bodies at poses r (..., n, 3), p (..., n, 4)."""
+    out = np.empty((*r.shape[:-2], len(body), 3))
+    moving = body > 0
+    b = body[moving] - 1
+    out[..., ~moving, :] = local[~moving]
+    out[..., moving, :] = r[..., b, :] + to_global(p[..., b, :], local[moving])
+    return out
+
+
 @attrs.frozen(eq=False)
 class Sticks:
     """Points on bodies that are drawn of a result: first the n mass centres.
@@ -82,12 +92,7 @@ class Sticks:
 
     def positions(self, r: Floats, p: Floats) -> Floats:
         """Positions (..., k, 3), m, of all places at poses r (..., n, 3), p (..., n, 4)."""
-        out = np.empty((*r.shape[:-2], len(self.body), 3))
-        moving = self.body > 0
-        b = self.body[moving] - 1
-        out[..., ~moving, :] = self.local[~moving]
-        out[..., moving, :] = r[..., b, :] + to_global(p[..., b, :], self.local[moving])
-        return out
+        return _placed(self.body, self.local, r, p)
 
     @property
     def _framed(self) -> "Sticks":
@@ -106,10 +111,11 @@ class Sticks:
             directions: (3, d) unit vectors along which they are measured.
         """
         found = []
-        count = max(1, BLOCK // (3 * len(self._framed.body)))
-        for start in range(0, len(result.t), count):
-            r, p, _, _ = split(result.u[start : start + count])
-            all_of_them = self._framed.positions(r, p).reshape(-1, 3) @ directions
+        framed = self._framed
+        step = max(1, BLOCK // (3 * len(framed.body)))
+        for start in range(0, len(result.t), step):
+            r, p, _, _ = split(result.u[start : start + step])
+            all_of_them = framed.positions(r, p).reshape(-1, 3) @ directions
             found.append([all_of_them.min(axis=0), all_of_them.max(axis=0)])
         return np.stack([np.min(found, axis=(0, 1)), np.max(found, axis=(0, 1))], axis=1)
 
@@ -149,7 +155,9 @@ def sticks_of(
     found, shaped = np.array(body), [] if shapes is None else [*shapes.hues]
     bare = np.isin(found, shaped, invert=True)
     wheels = [(k, R) for k, R in _wheels(scene, summary.body_names) if k not in shaped]
-    rims = [pair for n, (k, _) in enumerate(wheels) for pair in _rim(k, len(body) + n * SIDES)]
+    rims = []  # a spoke from each centre, and the sides of the circle
+    for first, (k, _) in zip(count(len(body), SIDES), wheels, strict=False):
+        rims += [(k - 1, first), *((first + n, first + (n + 1) % SIDES) for n in range(SIDES))]
     around = np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)
     circle = np.stack([np.cos(around), 0.0 * around, np.sin(around)], axis=1)
     return Sticks(
@@ -210,13 +218,6 @@ def _wheels(scene: Scene, names: Sequence[str]) -> Iterator[tuple[int, float]]:
         is_size = isinstance(radius, int | float) and 0.0 < radius < np.inf
         if element.type == "disk" and body in names and is_size:
             yield names.index(body) + 1, float(radius)
-
-
-def _rim(body: int, first: int) -> Iterator[tuple[int, int]]:
-    """Pairs of places of a circle whose places begin at ``first``, with a spoke to its centre."""
-    yield body - 1, first
-    for k in range(SIDES):
-        yield first + k, first + (k + 1) % SIDES
 
 
 def _places(pairs: Sequence[tuple[str, str]], place: Mapping[str, int]) -> Integers:
@@ -292,11 +293,7 @@ class Shapes:
 
     def seen(self, r: Floats, p: Floats, camera: Camera) -> tuple[Floats, Floats]:
         """Triangles (q, 3, 2) in the picture, from back to front, and their colours (q, 3)."""
-        points = self.local.copy()
-        moving = self.body > 0
-        on = self.body[moving] - 1
-        points[moving] = r[on] + to_global(p[on], self.local[moving])
-        corners = points[self.triangles]
+        corners = _placed(self.body, self.local, r, p)[self.triangles]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         length = np.linalg.norm(normal, axis=1)
         light = camera.towards + OBLIQUE[0] * camera.right + OBLIQUE[1] * camera.up

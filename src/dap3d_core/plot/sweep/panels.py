@@ -20,8 +20,6 @@ from dap3d_core.plot import style
 from dap3d_core.plot.sweep.sweep_table import DONE, Variable
 from dap3d_core.study import PointStatus
 
-#: Height of a map, inches.
-MAP_HEIGHT = 2.6
 #: More points of a line, or of a map, have no marks of their own.
 MARKED, MARKED_ON_MAP = 60, 400
 #: A map whose greatest value is so many times its median has logarithmic colours.
@@ -177,7 +175,7 @@ class Scatter(Lines):
                 rasterized=count > 2000)  # fmt: skip
 
 
-def _extend_down(ax: Axes, missing: NDArray[np.bool_]) -> None:
+def _extend_down(ax: Axes, missing: Mask) -> None:
     """Leave room below the curves for marks, where there are any."""
     if missing.any():
         low, high = ax.get_ylim()
@@ -196,16 +194,21 @@ class Heat(Panel):
     @property
     def height(self) -> float:
         """A suitable height, inches."""
-        return MAP_HEIGHT
+        return 2.6
 
     def paint(self, ax: Axes, size: tuple[float, float], legend: StatusLegend) -> None:
         """The map: values (y, x), and its colour bar."""
         values = self.output.values
         missing = ~np.isfinite(values)
+        finite = values[~missing]
+        # else most of the map would have the colour of one end
+        is_steep = bool(
+            len(finite) and finite.min() > 0.0 and finite.max() > STEEP * np.median(finite)
+        )
         _label_axes(ax, self.x, [self.y], size, grid=False)
         ax.patch.set(**HATCHED)
         mesh = ax.pcolormesh(edges(self.x), edges(self.y), np.ma.masked_invalid(values),
-                             cmap=COLORS, norm=norm_of(values, _is_steep(values)),
+                             cmap=COLORS, norm=norm_of(values, is_steep),
                              rasterized=True)  # fmt: skip
         label_bar(ax.figure.colorbar(mesh, ax=ax, pad=0.02), self.output, size[1])
         if missing.any():
@@ -215,12 +218,6 @@ class Heat(Panel):
             legend.mark(ax, self.status, missing, x, y)
         for spine in ax.spines.values():
             spine.set_visible(True)
-
-
-def _is_steep(values: Floats) -> bool:
-    """True where most of a map would have the colour of one end: colours are then logarithmic."""
-    finite = values[np.isfinite(values)]
-    return bool(len(finite) and finite.min() > 0.0 and finite.max() > STEEP * np.median(finite))
 
 
 def edges(axis: Variable) -> Floats:
@@ -317,12 +314,9 @@ def _label_axes(ax: Axes, x: Variable, outputs: Sequence[Variable], size: tuple[
         ax.set_xscale("log")
     if outputs[0].is_log:
         ax.set_yscale("log")
-    ax.set_xlabel(
-        style.folded(style.with_unit(x.label, x.unit), 13.5 * (width - 0.5)), fontsize=style.LETTERS
-    )
+    x_label = style.folded(style.with_unit(x.label, x.unit), 13.5 * (width - 0.5))
     labels = list(dict.fromkeys(output.label for output in outputs))
     label = style.with_unit(labels[0] if len(labels) == 1 else "", outputs[0].unit)
-    ax.set_ylabel(style.folded(label, 14 * (height - 0.4)), fontsize=style.LETTERS)
-    style.style_axes(ax, grid=grid)
+    style.style_axes(ax, x_label, style.folded(label, 14 * (height - 0.4)), grid=grid)
     if len(outputs) > 1:
         style.legend_above(ax, [output.name for output in outputs], width)

@@ -1,9 +1,8 @@
 """The data set of a sweep as plots need it: its numbers, its outputs, the status of its points."""
 
-import json
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
@@ -13,9 +12,8 @@ from dap3d_core.model.groups import Floats
 from dap3d_core.plot.style import unit_text
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.result import UnknownNameError
-from dap3d_core.result.file.schema import SWEEP
 from dap3d_core.study import REDUCTIONS, PointStatus
-from dap3d_core.study.sweep.dataset import at_places, evenly
+from dap3d_core.study.sweep.dataset import at_places, evenly, varied_of
 
 if TYPE_CHECKING:
     import xarray
@@ -139,7 +137,7 @@ class Table:
 
     def _is_log(self, name: str, values: Floats) -> bool:
         """True for a number that varies evenly in its logarithm."""
-        spec = _varied(self.data).get(name, "")
+        spec = varied_of(self.data).get(name, "")
         if isinstance(spec, str) and spec.replace(" ", "").endswith(":log"):
             return bool(np.all(values > 0.0))
         if self.sampled or name == TIME or len(values) < 3 or np.any(values <= 0.0):
@@ -161,12 +159,7 @@ def table_of(data: "xarray.Dataset", at: Mapping[str, float] | None = None) -> T
         ValueError: this is no sweep, it has no points, or a value is not finite.
         UnknownNameError: the sweep has no such dimension.
     """
-    if SWEEP not in data.attrs:
-        raise ValueError(
-            f"the data set is of no sweep: it has no attribute {SWEEP}; dap.sweep and "
-            "dap.open_sweep give one (keep_attrs=True keeps attributes in xarray)"
-        )
-    varied = [name for name in _varied(data) if name in data.coords]
+    varied = [name for name in varied_of(data) if name in data.coords]
     sampled = POINT in data.dims
     cut, words = _cut(data, at or {}, varied, sampled)
     for name in varied:
@@ -190,14 +183,6 @@ def table_of(data: "xarray.Dataset", at: Mapping[str, float] | None = None) -> T
         str(n) for n in cut.data_vars if n not in others and "parameter" not in cut[n].dims
     )
     return Table(cut, sampled, numbers, outputs, tuple(w for w in (title, *words) if w))
-
-
-def _varied(data: "xarray.Dataset") -> dict[str, Any]:
-    """Name and form of each number that varies."""
-    try:
-        return {str(one["name"]): one.get("spec", "") for one in json.loads(data.attrs["varied"])}
-    except (KeyError, TypeError, ValueError) as error:
-        raise ValueError(f"the sweep does not say what varies: {error}") from error
 
 
 def _cut(

@@ -7,7 +7,7 @@ states, so that other programs read such a file as any other; one that changes i
 import struct
 import zlib
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import BinaryIO
 
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.file.atomic_write import beginning, cannot, check_utf8
@@ -22,29 +22,9 @@ _HEADER, _END = 48, slice(28, 36)
 _FORMS = (2, 3)
 _PIECE = 2**20
 
-
-class ChecksumTrailer(NamedTuple):
-    """The last bytes of a file.
-
-    Attributes:
-        magic: keyword of the trailer.
-        is_whole: 1 if ``whole`` is known; 0 while the file grows.
-        head: checksum of the description of the file, from HDF5's header to the rows.
-        rows: offset of the rows, bytes.
-        size: of the file without the trailer, bytes.
-        whole: checksum of all of it.
-        own: checksum of the trailer up to here.
-    """
-
-    magic: bytes
-    is_whole: int
-    head: int
-    rows: int
-    size: int
-    whole: int
-    own: int
-
-
+#: The trailer, the last bytes of a file: this keyword; 1 if the checksum of all is known, 0 while
+#: the file grows; checksum of the description, from HDF5's header to the rows; offset of the rows;
+#: bytes of the file without the trailer; checksum of all of it; checksum of the trailer up to here.
 _MAGIC = b"dap3dsum"
 _LAYOUT = struct.Struct("<8sIIQQII")
 
@@ -119,12 +99,12 @@ def check_checksums(file: Path) -> None:
 
 def _mismatch(stream: BinaryIO, end: bytes, size: int) -> str:
     """The fault of a file with a trailer, or ""."""
-    trailer = ChecksumTrailer._make(_LAYOUT.unpack(end))
-    same = zlib.crc32(end[:-4]) == trailer.own and trailer.size == size
-    if same and trailer.is_whole and size <= WHOLE:
-        same = _checksum(stream, 0, size) == trailer.whole
+    _, is_whole, head, rows, stated, whole, own = _LAYOUT.unpack(end)
+    same = bool(zlib.crc32(end[:-4]) == own and stated == size)
+    if same and is_whole and size <= WHOLE:
+        same = _checksum(stream, 0, size) == whole
     elif same:
-        same = _checksum(stream, _HEADER, trailer.rows) == trailer.head
+        same = _checksum(stream, _HEADER, rows) == head
     return "" if same else "it is damaged: its checksum is not the one it was written with"
 
 

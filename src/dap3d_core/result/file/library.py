@@ -4,7 +4,7 @@ import os
 import threading
 import weakref
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Literal
@@ -80,19 +80,19 @@ def shared(path: Path) -> OpenFile:
     return file
 
 
-def guarded(path: Path, *actions: Callable[[], Any]) -> Any:
-    """Calls actions that use the library to write a file, and returns the last value.
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Whatever the library, or the system, raises while a file is written becomes one sentence.
 
     Raises:
-        ResultError: the library, or the system, refuses.
+        ResultError: it refuses.
     """
-    value = None
     try:
-        for action in actions:
-            value = action()
+        yield
+    except ResultError:
+        raise
     except (OSError, RuntimeError, ValueError) as error:
         raise cannot("write", path, error) from error
-    return value
 
 
 def opened(path: Path, mode: Literal["w", "r+", "r"] = "r") -> Any:
@@ -106,7 +106,7 @@ def opened(path: Path, mode: Literal["w", "r+", "r"] = "r") -> Any:
 
 @contextmanager
 def created(path: Path, target: Path) -> Iterator[Any]:
-    """A netCDF4.Dataset of a new file, closed at the end.
+    """A netCDF4.Dataset of a new file to write, closed at the end.
 
     Args:
         path: the new file.
@@ -115,12 +115,12 @@ def created(path: Path, target: Path) -> Iterator[Any]:
     Raises:
         ResultError: the library, or the system, refuses.
     """
-    with NETCDF:
-        dataset = guarded(target, lambda: opened(path, "w"))
+    with NETCDF, writing(target):
+        dataset = opened(path, "w")
         try:
             yield dataset
         finally:
-            guarded(target, dataset.close)
+            dataset.close()
 
 
 @contextmanager

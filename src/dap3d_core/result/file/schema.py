@@ -1,10 +1,12 @@
 """Layout of a result in a NetCDF-4 file: dimensions, variables with units, attributes."""
 
 import os
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from dap3d_core.result.arrays import (
     AXES,
@@ -141,18 +143,10 @@ def define(
             dataset.createDimension(name, len(values))
     for name, meaning in NAMES.items():
         if len(entries.get(name, ())) and not isinstance(entries[name], range):
-            variable = dataset.createVariable(name, str, (name,))
-            write_attributes(variable, about("1", meaning))
-            variable[:] = np.array(entries[name], dtype=object)
-    for constant in CONSTANTS:
-        if constant.dimensions[0] in dataset.dimensions:
-            array = getattr(summary, constant.name)
-            kind = "i8" if array.dtype.kind == "i" else "f8"
-            variable = dataset.createVariable(
-                constant.name, kind, constant.dimensions, fill_value=False
-            )
-            write_attributes(variable, about(constant.unit, constant.meaning))
-            variable[:] = array
+            _store(dataset, name, (name,), np.array(entries[name], object), about("1", meaning))
+    for name, dimensions, unit, meaning in CONSTANTS:
+        if dimensions[0] in dataset.dimensions:
+            _store(dataset, name, dimensions, getattr(summary, name), about(unit, meaning))
     if record.status != RUNNING and record.contacts.names:
         _write_contacts(dataset, record.contacts)
     _define_rows(dataset, (*COLUMNS, U_ERROR) if with_error else COLUMNS, is_sized=bool(nt))
@@ -161,21 +155,45 @@ def define(
     return os.path.getsize(dataset.filepath())
 
 
+def new_variable(
+    dataset: Any,
+    name: str,
+    kind: Any,
+    dimensions: tuple[str, ...],
+    about: Mapping[str, Any],
+    fill_value: Any = False,
+    **storage: Any,
+) -> Any:
+    """Defines a variable with its attributes; other arguments as of ``Dataset.createVariable``."""
+    variable = dataset.createVariable(name, kind, dimensions, fill_value=fill_value, **storage)
+    write_attributes(variable, about)
+    return variable
+
+
+def _store(
+    dataset: Any,
+    name: str,
+    dimensions: tuple[str, ...],
+    values: NDArray[Any],
+    about: dict[str, str],
+) -> None:
+    """Defines a variable of integers, numbers or texts, and writes its values."""
+    kind, fill = {"i": ("i8", False), "O": (str, None)}.get(values.dtype.kind, ("f8", False))
+    new_variable(dataset, name, kind, dimensions, about, fill)[:] = values
+
+
 def _write_contacts(dataset: Any, contacts: ContactTable) -> None:
     """Writes the contacts of shapes; where there is none, the names of the shapes alone."""
     sizes = {"contact_shape": len(contacts.names), "side": 2, "contact": len(contacts)}
     for name, size in sizes.items():
         if size:
             dataset.createDimension(name, size)
-    names = dataset.createVariable("contact_shape", str, ("contact_shape",))
-    write_attributes(names, about("1", "names of the shapes that collide"))
-    names[:] = np.array(contacts.names, dtype=object)
+    shapes = "contact_shape"
+    names = np.array(contacts.names, object)
+    _store(dataset, shapes, (shapes,), names, about("1", "names of the shapes that collide"))
     for name, (dimensions, unit, meaning) in FIELDS.items() if len(contacts) else ():
         values = getattr(contacts, name)
-        kind = "i8" if values.dtype.kind == "i" else "f8"
-        variable = dataset.createVariable(f"contact_{name}", kind, dimensions, fill_value=False)
-        write_attributes(variable, about(unit, meaning))
-        variable[:] = values
+        _store(dataset, f"contact_{name}", dimensions, values, about(unit, meaning))
 
 
 def contacts_of(dataset: Any) -> ContactTable:
@@ -201,11 +219,9 @@ def _define_rows(dataset: Any, columns: tuple[Column, ...], *, is_sized: bool) -
     storage: dict[str, Any] = {"contiguous": True} if is_sized else {}
     for column in columns:
         if dataset.dimensions.keys() >= set(column.dimensions):
-            variable = dataset.createVariable(
-                column.name, "f8", column.dimensions, fill_value=False, **storage
-            )
             coordinates = {"coordinates": "t"} if column.name != "t" else {}
-            write_attributes(variable, about(column.unit, column.meaning) | coordinates)
+            attributes = about(column.unit, column.meaning) | coordinates
+            new_variable(dataset, column.name, "f8", column.dimensions, attributes, **storage)
 
 
 def allocate_rows(dataset: Any) -> None:
@@ -220,7 +236,7 @@ def allocate_rows(dataset: Any) -> None:
             dataset.variables[column.name][nt - 1] = 0.0
 
 
-def write_attributes(item: Any, values: dict[str, Any]) -> None:
+def write_attributes(item: Any, values: Mapping[str, Any]) -> None:
     """Writes attributes of a data set or a variable, text as strings."""
     for name, value in values.items():
         if isinstance(value, str):

@@ -1,8 +1,8 @@
 """Writing of NetCDF-4 files: results as a whole, and files that grow with a run or a sweep."""
 
 import os
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from dap3d_core.result.file.atomic_write import (
     whole_file,
 )
 from dap3d_core.result.file.checksum import write_checksums
-from dap3d_core.result.file.library import NETCDF, created, guarded, opened
+from dap3d_core.result.file.library import NETCDF, created, opened, writing
 from dap3d_core.result.file.schema import allocate_rows, define, write_rows, write_times
 from dap3d_core.result.metadata import RUNNING, RunMetadata
 
@@ -40,18 +40,14 @@ def save(
     target = Path(path)
     with whole_file(path, force) as part:
         with created(part, target) as dataset:
-
-            def write() -> int:
-                rows = define(dataset, summary, record, len(arrays), with_error=arrays.has_error)
-                first = 0
-                for block in arrays.blocks():
-                    write_rows(dataset, block, first)
-                    write_times(dataset, block, first)
-                    first += len(block)
-                return rows
-
-            rows = guarded(target, write)
-        guarded(target, lambda: write_checksums(part, rows, is_whole=True))
+            rows = define(dataset, summary, record, len(arrays), with_error=arrays.has_error)
+            first = 0
+            for block in arrays.blocks():
+                write_rows(dataset, block, first)
+                write_times(dataset, block, first)
+                first += len(block)
+        with writing(target):
+            write_checksums(part, rows, is_whole=True)
 
 
 class GrowingFile:
@@ -70,40 +66,19 @@ class GrowingFile:
         self.target = check_target(path, force)
         self.part = self.target.with_name(f"{self.target.name}.part")
 
-    def _create(
-        self,
-        definition: Callable[[Any], Any],
-        completion: Callable[[Path, Any], None] = lambda new, value: None,
-    ) -> Path:
-        """Creates the file under a temporary name and names it ``NAME.part`` or the next free.
+    @contextmanager
+    def _new_part(self) -> Iterator[Path]:
+        """A temporary file to define; at the end its name is ``NAME.part`` or the next free one.
 
-        Killed meanwhile it leaves no half-defined part.
-
-        Args:
-            definition: defines the data set.
-            completion: receives the path of the closed file, and what ``definition`` returned.
+        A process that is killed meanwhile leaves no half-defined part.
         """
         new = reserve(self.target)
         try:
-            with created(new, self.target) as dataset:
-                value = guarded(self.target, lambda: definition(dataset))
-            completion(new, value)
-            return named_part(new, self.target)
+            yield new
+            self.part = named_part(new, self.target)
         except BaseException:
             new.unlink(missing_ok=True)
             raise
-
-    def _append(
-        self, dataset: Any, values: Callable[[], None], marks: Callable[[], None], *, durable: bool
-    ) -> None:
-        """Writes values, then their marks, and hands both to the system, or to the disk."""
-
-        def flush() -> None:
-            dataset.sync()
-            if durable:
-                synchronise(self.part)
-
-        guarded(self.part, values, flush, marks, flush)
 
 
 class ResultWriter(GrowingFile):
@@ -141,17 +116,17 @@ class ResultWriter(GrowingFile):
         self.count = 0
         self._dataset: Any = None
         started = attrs.evolve(record, status=RUNNING)
-
-        def allocate(new: Path, rows: int) -> None:
-            # opened again, so that the description of the file shares no block with the rows
-            self._dataset = guarded(self.target, lambda: opened(new, "r+"))
-            guarded(self.target, lambda: allocate_rows(self._dataset), self._dataset.sync)
-            if most:
-                guarded(self.target, lambda: write_checksums(new, rows, is_whole=False))
-
         with NETCDF:
             try:
-                self.part = self._create(lambda d: define(d, summary, started, most), allocate)
+                with self._new_part() as new, writing(self.target):
+                    with created(new, self.target) as dataset:
+                        rows = define(dataset, summary, started, most)
+                    # opened again: the description of the file shares no block with the rows
+                    self._dataset = opened(new, "r+")
+                    allocate_rows(self._dataset)
+                    self._dataset.sync()
+                    if most:
+                        write_checksums(new, rows, is_whole=False)
             except BaseException:
                 with suppress(ResultError):
                     self.close()
@@ -168,12 +143,11 @@ class ResultWriter(GrowingFile):
             raise ResultError(f"cannot write {self.target}: the writer is closed")
         with NETCDF:
             try:
-                self._append(
-                    self._dataset,
-                    lambda: write_rows(self._dataset, arrays, self.count),
-                    lambda: write_times(self._dataset, arrays, self.count),
-                    durable=False,
-                )
+                with writing(self.part):
+                    write_rows(self._dataset, arrays, self.count)
+                    self._dataset.sync()
+                    write_times(self._dataset, arrays, self.count)
+                    self._dataset.sync()
             except ResultError:
                 with suppress(ResultError):
                     self.close()
@@ -186,14 +160,16 @@ class ResultWriter(GrowingFile):
         Raises:
             ResultError: the system refuses.
         """
-        guarded(self.part, lambda: synchronise(self.part))
+        with writing(self.part):
+            synchronise(self.part)
 
     def close(self) -> None:
         """Closes the part."""
         with NETCDF:
             dataset, self._dataset = self._dataset, None
             if dataset is not None:
-                guarded(self.part, dataset.close)
+                with writing(self.part):
+                    dataset.close()
 
     def discard(self) -> None:
         """Closes the part and removes it."""

@@ -117,26 +117,40 @@ def jacobians(evaluator: "Evaluator", t: Floats, u: Floats, inputs: Floats) -> A
 
 
 @np.errstate(all="ignore")  # as compiled code does
-def reactions(
+def reactions_of(
     evaluator: "Evaluator", at: Instants, joints: Collection[int]
 ) -> dict[int, dict[str, Reaction]]:
     """Reactions of joints, by their indices, on each of their bodies: D_slot^T lambda.
 
+    The forces that joints bring are part of them.
+
     Returns:
         For each joint a reaction for each slot, by its letter.
     """
-    loops = _joint_loops(evaluator, np.array(list(joints), dtype=np.int64))
+    model, loops = evaluator.model, []
+    for q, (kind, group) in enumerate(evaluator.loop_groups):
+        indices = np.flatnonzero(np.isin(group.members, list(joints)))
+        if kind == "acceleration" and len(indices):
+            loops.append(_JointLoop(evaluator, q, group, indices))
     wrenches = [np.empty((len(at.t), *loop.shape)) for loop in loops]
     for k, time in place_at(evaluator, at):
         for loop, out in zip(loops, wrenches, strict=True):
             if at.angles is not None:
                 loop.parameters.set_angles(at.angles[k])
             out[k] = loop.wrenches(time, at.Lam[k])
-    return {
-        int(joint): actions_of(evaluator.model, at.u, loop.group, index, out[:, n])
+    found = {
+        int(joint): actions_of(model, at.u, loop.group, index, out[:, n])
         for loop, out in zip(loops, wrenches, strict=True)
         for n, (joint, index) in enumerate(zip(loop.joints, loop.indices, strict=True))
     }
+    for joint, actions in found.items():
+        if name := model.brought_forces.get(model.joint_names[joint]):
+            rates = np.zeros((len(at.t), 6 * model.body_count))
+            output = force_output(evaluator, at, rates, name)
+            for slot, more in output.on.items():
+                force, moment = actions[slot].force + more.force, actions[slot].moment + more.moment
+                actions[slot] = attrs.evolve(actions[slot], force=force, moment=moment)
+    return found
 
 
 def place_at(evaluator: "Evaluator", at: "Instants | Arrays") -> Iterator[tuple[int, float]]:
@@ -205,18 +219,6 @@ class InstanceParameters:
         for column, offset in zip(self._columns.T, self._offsets, strict=True):
             self._copy[:, offset : offset + ANGLE_WIDTH] = 0.0
             self._copy[:, offset] = angles[column]
-
-
-def _joint_loops(evaluator: "Evaluator", joints: Integers) -> list["_JointLoop"]:
-    """Loops over some joints, one for each type."""
-    members = [
-        (q, group, np.flatnonzero(np.isin(group.members, joints)))
-        for q, (kind, group) in enumerate(evaluator.loop_groups)
-        if kind == "acceleration"
-    ]
-    return [
-        _JointLoop(evaluator, q, group, indices) for q, group, indices in members if len(indices)
-    ]
 
 
 class _JointLoop:
@@ -321,22 +323,6 @@ def force_output(
         length, rate, tension = _along(group, index, at.u, v_dot, on["i"].force)
         return attrs.evolve(output, length=length, length_rate=rate, tension=tension)
     return output
-
-
-def reactions_of(
-    evaluator: "Evaluator", at: Instants, joints: Collection[int]
-) -> dict[int, dict[str, Reaction]]:
-    """As ``reactions``, with the forces that joints bring."""
-    found = reactions(evaluator, at, joints)
-    model = evaluator.model
-    for joint, actions in found.items():
-        if name := model.brought_forces.get(model.joint_names[joint]):
-            rates = np.zeros((len(at.t), 6 * model.body_count))
-            output = force_output(evaluator, at, rates, name)
-            for slot, more in output.on.items():
-                force, moment = actions[slot].force + more.force, actions[slot].moment + more.moment
-                actions[slot] = attrs.evolve(actions[slot], force=force, moment=moment)
-    return found
 
 
 def group_of(evaluator: "Evaluator", name: str, element: int) -> tuple[Group, int]:

@@ -182,14 +182,6 @@ def _coordinate(
     return Quantity(name, values, kind, f"{kind} of {owner.name}", unit, (), "coordinate", rate)
 
 
-def _coordinate_names(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]:
-    """Names of the coordinates of a joint; none where the model for them is not available."""
-    if owner.kind == "joint" and not owner.slot:
-        with suppress(ResultError, UnknownNameError):
-            return tuple(result.coordinates(owner.name).names)
-    return ()
-
-
 def _columns(result: QuantitySource, owner: QuantityOwner, attribute: str) -> tuple[str, ...]:
     """Names of the columns of a quantity."""
     if attribute == "lambda" and owner.kind == "joint":
@@ -285,8 +277,11 @@ def _attributes(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]
     names = ACTIONS if owner.slot else QUANTITIES[owner.kind]
     is_actuator = owner.name in result.record.actuation
     known = (name for name in names if name != ACTUATION or is_actuator)
-    own = (*states_of(result.summary, owner), *unknowns_of(result, owner))
-    return (*known, *own, *_coordinate_names(result, owner))
+    own = [*states_of(result.summary, owner), *unknowns_of(result, owner)]
+    if owner.kind == "joint" and not owner.slot:
+        with suppress(ResultError, UnknownNameError):  # where the model for them is at hand
+            own += result.coordinates(owner.name).names
+    return (*known, *own)
 
 
 def _fault(result: QuantitySource, owner: QuantityOwner, rest: list[str]) -> str:
@@ -365,16 +360,13 @@ def states_of(summary: ModelSummary, owner: QuantityOwner) -> dict[str, dict[str
 
 def unknowns_of(source: QuantitySource, owner: QuantityOwner) -> dict[str, int]:
     """Columns of the unknowns of an owner; none where the model for them is not available."""
-    if owner.kind == "joint" and not owner.slot and _has_own_angles(source.summary):
+    # angles of elements and unknowns, so far as their names are known
+    names = source.summary.angle_names or [""] * source.summary.angle_count
+    has_own = any(not name.startswith(JOINT_ANGLES) for name in names)
+    if owner.kind == "joint" and not owner.slot and has_own:
         with suppress(ResultError):
             return source.model.unknowns_of(owner.name)
     return {}
-
-
-def _has_own_angles(summary: ModelSummary) -> bool:
-    """True if elements have angles or unknowns of their own, so far as that is known."""
-    names = summary.angle_names or [""] * summary.angle_count
-    return any(not name.startswith(JOINT_ANGLES) for name in names)
 
 
 def own_quantity(
@@ -431,7 +423,7 @@ def _contact_quantity(source: QuantitySource, name: str) -> Quantity | None:
     part = CONTACT_QUANTITIES.get(rest[0]) if rest else None
     component = rest[1] if len(rest) == 2 else ""
     several = len(points) > 1 and POINT not in head
-    allowed = (*AXES, "norm", "") if part is not None and part.is_vector else ("",)
+    allowed = (*AXES, NORM, "") if part is not None and part.is_vector else ("",)
     if part is None or len(rest) > 2 or component not in allowed or (several and part.is_vector):
         known = ", ".join(f"{head}.{n}" for n in CONTACT_QUANTITIES)
         more = f"; vectors are those of a point, {points[0]}.slip.x" if several else ""
@@ -443,7 +435,5 @@ def _contact_quantity(source: QuantitySource, name: str) -> Quantity | None:
     label = f"{kind} of {head}" + (f", {component}" if component else "")
     components = AXES if part.is_vector else tuple(points) if several else ()
     if component:
-        column = np.linalg.norm(values, axis=1) if component == "norm" else None
-        values = values[:, AXES.index(component)] if column is None else column
-        components = ()
+        values, components = _component_of(values, AXES, component), ()
     return Quantity(name, values, kind, label, unit, components, "contact")

@@ -73,7 +73,12 @@ def read_measured(
     chosen = _chosen(columns, outputs, mistakes)
     values = {label: _numbers(label, columns[label], mistakes) for label in chosen}
     if times is not None:
-        _check_times(named[0], times, mistakes)
+        bad = times[~(np.isfinite(times) & (times >= 0.0))]
+        if len(bad):
+            what = "a run begins at t = 0: times are numbers from 0, in s"
+            mistakes.append(Mistake(f"measured.{named[0]}", float(bad[0]), what))
+        elif not len(times):
+            mistakes.append(Mistake("measured", MISSING, "there are no measurements"))
         for label, array in values.items():
             if array is not None and len(array) != len(times):
                 what = f"{len(array)} values for {len(times)} times"
@@ -89,15 +94,6 @@ def read_measured(
     if mistakes or times is None:
         return None, chosen, mistakes
     return MeasuredData(times, good, chosen, deviations), chosen, []
-
-
-def _check_times(name: str, times: Floats, mistakes: list[Mistake]) -> None:
-    bad = times[~(np.isfinite(times) & (times >= 0.0))]
-    if len(bad):
-        what = "a run begins at t = 0: times are numbers from 0, in s"
-        mistakes.append(Mistake(f"measured.{name}", float(bad[0]), what))
-    elif not len(times):
-        mistakes.append(Mistake("measured", MISSING, "there are no measurements"))
 
 
 def _columns(measured: Any, mistakes: list[Mistake]) -> dict[str, Any]:

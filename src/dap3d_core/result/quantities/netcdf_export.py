@@ -8,13 +8,13 @@ import numpy as np
 
 from dap3d_core.result.arrays import AXES, EULER
 from dap3d_core.result.errors import ResultError
-from dap3d_core.result.file.atomic_write import cannot, whole_file
-from dap3d_core.result.file.library import NETCDF
-from dap3d_core.result.file.schema import about, attributes, write_attributes
+from dap3d_core.result.file.atomic_write import whole_file
+from dap3d_core.result.file.library import NETCDF, writing
+from dap3d_core.result.file.schema import about, attributes, new_variable
 from dap3d_core.result.post.force_output import DENSE_ROWS, rows_at
 from dap3d_core.result.quantities.catalogue import ACTIONS
 from dap3d_core.result.quantities.lookup import CONTACT_QUANTITIES, find, joint_coordinates
-from dap3d_core.result.quantities.xarray_dataset import add_outputs, dataset_of
+from dap3d_core.result.quantities.xarray_dataset import add_outputs, dataset_of, dimensions_of
 
 if TYPE_CHECKING:
     import xarray
@@ -167,12 +167,9 @@ def selection_of(result: "Result", names: Iterable[str]) -> "xarray.Dataset":
         quantity = find(result, name)
         if "/" in name:
             raise ResultError(f"a NetCDF file has no variable {name!r} with '/': write a .csv file")
-        dimensions = ["time"]
-        if quantity.values.ndim > 1:
-            dimension = {AXES: "axis", EULER: "euler"}.get(quantity.components, f"{name}_row")
-            dimensions.append(dimension)
-            if quantity.components in (AXES, EULER):
-                coordinates[dimension] = (dimension, list(quantity.components))
+        dimensions = dimensions_of(quantity)
+        if quantity.components in (AXES, EULER):
+            coordinates[dimensions[1]] = (dimensions[1], list(quantity.components))
         variables[name] = (dimensions, quantity.values, about(quantity.unit, quantity.label))
     return xarray.Dataset(variables, coordinates, attributes(result.summary, result.record))
 
@@ -201,17 +198,12 @@ def write_netcdf(
     jacobian = jacobian and result.summary.row_count > 0
     if jacobian:
         _ = result.evaluator
-    with whole_file(path, force) as part, NETCDF:
-        try:
-            _put(dataset, part)
-            with netCDF4.Dataset(part, "a") as file:
-                if jacobian:
-                    _add_jacobian(file, result)
-                return _contents(file)
-        except (OSError, RuntimeError) as error:
-            if isinstance(error, ResultError):
-                raise
-            raise cannot("write", path, error) from error
+    with whole_file(path, force) as part, NETCDF, writing(path):
+        _put(dataset, part)
+        with netCDF4.Dataset(part, "a") as file:
+            if jacobian:
+                _add_jacobian(file, result)
+            return _contents(file)
 
 
 def write_dataset(dataset: "xarray.Dataset", path: Path, *, force: bool) -> None:
@@ -220,11 +212,8 @@ def write_dataset(dataset: "xarray.Dataset", path: Path, *, force: bool) -> None
     Raises:
         ResultError: the file cannot be written, or exists and ``force`` is off.
     """
-    with whole_file(path, force) as part, NETCDF:
-        try:
-            _put(dataset, part)
-        except (OSError, RuntimeError) as error:
-            raise cannot("write", path, error) from error
+    with whole_file(path, force) as part, NETCDF, writing(path):
+        _put(dataset, part)
 
 
 def _put(dataset: "xarray.Dataset", part: Path) -> None:
@@ -245,19 +234,14 @@ def _add_jacobian(file: Any, result: "Result") -> None:
         if variable is None and sparse:
             file.createDimension("entry", len(rows.value))
             for name, places in (("row", rows.row), ("column", rows.column)):
-                _new(file, f"Jac_{name}", "i8", ("entry",), "1", f"{name} of an entry")[:] = places
-            variable = _new(file, "Jac_value", "f8", ("time", "entry"), "SI", f"{meaning}, entries")
+                text = about("1", f"{name} of an entry")
+                new_variable(file, f"Jac_{name}", "i8", ("entry",), text)[:] = places
+            text = about("SI", f"{meaning}, entries")
+            variable = new_variable(file, "Jac_value", "f8", ("time", "entry"), text)
         elif variable is None:
-            variable = _new(file, "Jac", "f8", ("time", "row", "velocity"), "SI", meaning)
+            dimensions = ("time", "row", "velocity")
+            variable = new_variable(file, "Jac", "f8", dimensions, about("SI", meaning))
         variable[k] = rows.value if sparse else rows.dense()
-
-
-def _new(
-    file: Any, name: str, kind: str, dimensions: tuple[str, ...], unit: str, meaning: str
-) -> Any:
-    variable = file.createVariable(name, kind, dimensions, fill_value=False)
-    write_attributes(variable, about(unit, meaning))
-    return variable
 
 
 def _contents(file: Any) -> list[dict[str, Any]]:

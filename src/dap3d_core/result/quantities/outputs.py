@@ -79,15 +79,13 @@ def _unit(expression: Expression, operands: Mapping[str, Quantity]) -> tuple[str
     Raises:
         ExpressionError: it adds unlike units, or its value has another unit than is declared.
     """
-    units = {name: _of_operand(quantity) for name, quantity in operands.items()}
+    units = {
+        name: UNKNOWN if one.owner == "input" else unit_of(one.unit, exact=one.exact)
+        for name, one in operands.items()
+    }
     carried = expression.carried_unit(units)
     if expression.unit:
         if fault := contradiction(expression.unit, carried):
             raise ExpressionError(f"{fault}; convert the value, as angle/deg or x/mm")
         return expression.unit, True
     return text_of(carried), not isinstance(carried, Unit) or carried.exact
-
-
-def _of_operand(quantity: Quantity) -> Unit:
-    """The unit of an operand; inputs are numbers of any unit."""
-    return UNKNOWN if quantity.owner == "input" else unit_of(quantity.unit, exact=quantity.exact)

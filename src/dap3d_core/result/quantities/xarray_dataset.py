@@ -6,7 +6,7 @@ import numpy as np
 
 from dap3d_core.result.arrays import AXES, COLUMNS, EULER, U_ERROR
 from dap3d_core.result.file.schema import CONSTANTS, NAMES, about, attributes
-from dap3d_core.result.quantities.catalogue import MOTION, SYSTEM, QuantitySource
+from dap3d_core.result.quantities.catalogue import MOTION, SYSTEM, Quantity, QuantitySource
 from dap3d_core.result.quantities.lookup import available_outputs
 
 if TYPE_CHECKING:
@@ -72,6 +72,13 @@ def dataset_of(result: QuantitySource) -> "xarray.Dataset":
     return xarray.Dataset(variables, coordinates, attributes(summary, result.record))
 
 
+def dimensions_of(quantity: Quantity) -> tuple[str, ...]:
+    """Dimensions of the variable of a quantity, time first."""
+    if quantity.values.ndim == 1:
+        return ("time",)
+    return "time", {AXES: "axis", EULER: "euler"}.get(quantity.components, f"{quantity.name}_row")
+
+
 def add_outputs(dataset: "xarray.Dataset", result: QuantitySource) -> "xarray.Dataset":
     """A data set with the outputs of the scene that can be computed.
 
@@ -81,8 +88,6 @@ def add_outputs(dataset: "xarray.Dataset", result: QuantitySource) -> "xarray.Da
     variables: dict[str, Any] = {}
     for output in available_outputs(result):
         name = f"{output.name}_output" if output.name in taken else output.name
-        columns = {(): (), AXES: ("axis",), EULER: ("euler",)}
-        dimension = columns.get(output.components, (f"{output.name}_row",))
         text = f"output {output.name} = {result.outputs[output.name].text}"
-        variables[name] = (("time", *dimension), output.values, about(output.unit, text))
+        variables[name] = (dimensions_of(output), output.values, about(output.unit, text))
     return dataset.assign(variables)

@@ -119,7 +119,10 @@ class BatchRunner:
         if self.parameter_map is not None:
             which, rows = self._run_mapped(self.parameter_map, values)
         else:
-            which, rows = self._run_rebuilt(values, batch.notes, first)
+            which, start, notes = self._rebuilt(values)
+            for k, note in zip(first + which, notes, strict=True):
+                batch.notes[k] = note
+            rows = self.compiled_batch.run(start)
         good = self._good(rows)
         which = which[good]
         self._note_corrections(rows, np.flatnonzero(good), first + which, batch.notes)
@@ -133,10 +136,10 @@ class BatchRunner:
         self._refer_to_start()
         start, valid = self._mapped_starts(parameter_map, values)
         which = np.flatnonzero(valid)
-        table, y0 = start.table[which], start.y0[which]
-        rows = self._runs.run(table, start.places, y0, start.start)
+        start = start._replace(table=start.table[which], y0=start.y0[which])
+        rows = self._runs.run(start)
         if parameter_map.moves:
-            rows.done[parameter_map.are_undefined(table, rows.y0)] = False
+            rows.done[parameter_map.are_undefined(start.table, rows.y0)] = False
         return which, rows
 
     def _refer_to_start(self) -> None:
@@ -172,13 +175,21 @@ class BatchRunner:
 
     def _rebuilt_starts(self, values: Floats) -> Starts | None:
         """Starts of points (k, p) with models of their own; None where one cannot be run."""
+        which, start, _ = self._rebuilt(values)
+        return start if len(which) == len(values) else None
+
+    def _rebuilt(self, values: Floats) -> tuple[Integers, Starts, list[str]]:
+        """Indices of points that can be run with models of their own, their starts and notes."""
         points = [self._rebuilder.prepare(value) for value in values]
         self.compiled_batch.evaluator.set_inputs(self._compiled.model.input_values)
+        which = [k for k, point in enumerate(points) if point is not None]
         found = [point for point in points if point is not None]
-        if len(found) < len(points):
-            return None
-        table, y0 = np.array([p.table for p in found]), np.array([p.y0 for p in found])
-        return Starts(table, self._rebuilder.places, y0, driver.UNCORRECTED)
+        places = self._rebuilder.places
+        table = np.array([point.table for point in found]).reshape(-1, len(places))
+        y0 = np.array([point.y0 for point in found])
+        y0 = y0.reshape(-1, self.compiled_batch.last_start.size)
+        notes = ["; ".join(point.notes) for point in found]
+        return np.array(which, dtype=np.int64), Starts(table, places, y0), notes
 
     def run_with_slopes(self, x: Floats, size: Floats) -> tuple[Floats, Floats] | None:
         """Rows (nt, width) of a point x (p,) and (nt, width, p) their derivatives.
@@ -217,24 +228,6 @@ class BatchRunner:
         multipliers = self._compiled.model.row_layout["Lam"].start
         good = rows.done & (rows.diagnostics[:, driver.FRICTION_FAILURES] == 0.0)
         return good & ~self._pulling.among(rows.rows[..., multipliers:])
-
-    def _run_rebuilt(
-        self, values: Floats, notes: list[str], first: int
-    ) -> tuple[Integers, BatchRows]:
-        """Run points each of which has a model of its own."""
-        which, points = [], []
-        for k, values_of_point in enumerate(values):
-            point = self._rebuilder.prepare(values_of_point)
-            if point is not None:
-                which.append(k)
-                points.append(point)
-                notes[first + k] = "; ".join(point.notes)
-        self.compiled_batch.evaluator.set_inputs(self._compiled.model.input_values)
-        places = self._rebuilder.places
-        table = np.array([point.table for point in points]).reshape(-1, len(places))
-        y0 = np.array([point.y0 for point in points])
-        y0 = y0.reshape(-1, self.compiled_batch.last_start.size)
-        return np.array(which, dtype=np.int64), self.compiled_batch.run(table, places, y0)
 
     def _reduce(self, values: Floats, index: Integers, rows: Floats, batch: Batch) -> None:
         """Store the outputs of points with these rows (k, nt, width) in a batch."""
@@ -333,6 +326,8 @@ class ModelRebuilder:
 
     def prepare(self, point: Floats) -> _RebuiltPoint | None:
         """A point as it starts; None where it cannot be run in a batch."""
+        from dap3d_core.model.element_states import tolerances
+
         evaluator = self._evaluator
         try:
             checked, model = self.load(point)
@@ -341,8 +336,10 @@ class ModelRebuilder:
             return None
         if start.redundancy.rank.rank != self._rank or not start.redundancy.is_plain:
             return None
-        if model.state_count and not self._has_same_tolerances(model):
-            return None
+        if model.state_count and not np.array_equal(
+            tolerances(model.acting), tolerances(self._compiled.model.acting)
+        ):
+            return None  # the integration has those of the scene as given
         if stops_of(checked, model, self._t_end) != self._stops:
             return None
         if not np.array_equal(model.input_values, self._compiled.model.input_values):
@@ -357,13 +354,6 @@ class ModelRebuilder:
         if self._structure_of(evaluator) != self._structure:
             return None
         return _RebuiltPoint(numbers_of(evaluator), y0, warnings)
-
-    def _has_same_tolerances(self, model: Model) -> bool:
-        """True if the states of elements have the tolerances of the integration."""
-        from dap3d_core.model.element_states import tolerances
-
-        given = tolerances(self._compiled.model.acting)
-        return np.array_equal(tolerances(model.acting), given)
 
     @staticmethod
     def _structure_of(evaluator: Evaluator) -> bytes:

@@ -48,12 +48,24 @@ MakeBatch = Callable[[], "CompiledBatch"]
 
 
 class Starts(NamedTuple):
-    """What k points start from: arguments of ``CompiledBatch.run``."""
+    """What k points start from.
+
+    Attributes:
+        table: (k, w) numbers that differ from the model's.
+        places: (w,) their indices in the numbers (``numbers_of``).
+        y0: (k, n) states to start from.
+        start: UNCORRECTED, CORRECT, or CORRECT_ONLY (driver.py).
+    """
 
     table: Floats
     places: Integers
     y0: Floats
-    start: int
+    start: int = driver.UNCORRECTED
+
+    @property
+    def first(self) -> "Starts":
+        """The first point alone."""
+        return self._replace(table=self.table[:1], y0=self.y0[:1])
 
 
 class BatchRows(NamedTuple):
@@ -136,18 +148,18 @@ class CompiledBatch:
         self._calls, self._point_calls = 0.0, USUAL_CALLS
         #: Numbers of the model, and the places of those that have differed in a point.
         self._numbers, self._varied = numbers_of(evaluator), np.zeros(0, dtype=np.int64)
-        self.run(np.zeros((0, 0)), np.zeros(0, dtype=np.int64), y0[None][:0])  # to compile it
+        none = np.zeros(0, dtype=np.int64)
+        self.run(Starts(np.zeros((0, 0)), none, y0[None][:0]))  # to compile it
 
     @property
     def lanes(self) -> "LaneBatch | str | None":
         """What ran points in lanes of vectors; in words why none; None where none was needed."""
         return None if self._lanes is None else self._lanes[1]
 
-    def _lanes_for(self, *point: Any) -> "LaneBatch | str":
+    def _lanes_for(self, point: Starts) -> "LaneBatch | str":
         """What runs many points in lanes; in words why they are run one by one.
 
-        Args:
-            point: arguments of ``points`` for one that is run to see the ways of projections.
+        point: one that is run to see the ways of projections.
         """
         from dap3d_core.study.batch.lanes import LaneBatch, reason_against, wide_rates
 
@@ -157,7 +169,7 @@ class CompiledBatch:
             if not found:
                 varied = varied_at(self.evaluator.system, self._varied)
                 projects = self.integration.work.projects != 0
-                states = self._states_of_run(self.points(*point)) if projects else []
+                states = self._states_of_run(self.points(point)) if projects else []
                 wide = wide_rates(self.evaluator, *self._place, varied, states)
                 found = (
                     wide
@@ -210,15 +222,9 @@ class CompiledBatch:
             work.tolerance[:] = self.integration.work.tolerance
         return works
 
-    @property
-    def number_count(self) -> int:
-        """Numbers that may differ from point to point."""
-        return len(numbers_of(self.evaluator))
-
-    def points(
-        self, table: Floats, places: Integers, y0: Floats, start: int = driver.UNCORRECTED
-    ) -> driver.Points:
-        """Points to run; arguments as of ``run``."""
+    def points(self, starts: Starts) -> driver.Points:
+        """Points to run."""
+        table, places, y0, start = starts
         count, nt = len(table), len(self.integration.work.rows)
         own = not self.evaluator.coordinates.are_of_bodies
         return driver.Points(
@@ -236,19 +242,10 @@ class CompiledBatch:
         of, tables = self.evaluator, (self.evaluator.functions, _drives(), self._begin)
         return points, self.integration.work, *tables, of.system, of.loops, CALL
 
-    def run(
-        self, table: Floats, places: Integers, y0: Floats, start: int = driver.UNCORRECTED
-    ) -> BatchRows:
-        """Run k points.
-
-        Args:
-            table: (k, w) numbers that differ from the model's.
-            places: (w,) their indices in the numbers (``numbers_of``).
-            y0: (k, n) states to start from.
-            start: UNCORRECTED, CORRECT, or CORRECT_ONLY (driver.py).
-        """
-        work, count = self.integration.work, len(table)
-        points = self.points(table, places, y0, start)
+    def run(self, starts: Starts) -> BatchRows:
+        """Run points."""
+        work, count = self.integration.work, len(starts.table)
+        points = self.points(starts)
         diagnostics = points.diagnostics
         arguments = self.arguments(points)
         programs = self._programs_for(points)
@@ -268,10 +265,11 @@ class CompiledBatch:
             calls, steps, reports = diagnostics[:, columns].sum(axis=0).astype(int).tolist()
             return calls + work.rhs_count, steps + work.step_count, reports + work.report_count
 
-        if start != driver.CORRECT_ONLY and self.takes_lanes and self._is_long(count):
+        may_take_lanes = self.takes_lanes and starts.start != driver.CORRECT_ONLY
+        if may_take_lanes and self._is_long(count):
             from dap3d_core.formulations.programs.scene_program import reads_rates
 
-            lanes = self._lanes_for(table[:1], places, y0[:1], start)
+            lanes = self._lanes_for(starts.first)
             if not isinstance(lanes, str) and lanes.is_ready:
                 run(lambda: lanes.run(points, CALL), needs_programs=reads_rates(self.evaluator))
         while True:
@@ -282,7 +280,7 @@ class CompiledBatch:
             self.last_start = points.y0[-1]
             self._calls += float(np.sum(diagnostics[:, driver.CALLS]))
             self._point_calls = float(np.mean(diagnostics[:, driver.CALLS]))
-        return self.rows_of(points, y0)
+        return self.rows_of(points, starts.y0)
 
     def rows_of(self, points: driver.Points, given: Floats) -> BatchRows:
         """Rows of points that were run; given: the states that were given."""
@@ -345,7 +343,7 @@ class TreePoints:
     def _other(self) -> CompiledBatch:
         return self._make_other()
 
-    def run(self, table: Floats, places: Integers, y0: Floats, start: int) -> BatchRows:
+    def run(self, starts: Starts) -> BatchRows:
         """As ``CompiledBatch.run``; states (k, 13 n + 1), also those returned, are of bodies.
 
         Points whose correction moves bodies from where they start in the scene are not done.
@@ -353,13 +351,15 @@ class TreePoints:
         coordinates = self._batch.evaluator.coordinates
         assert isinstance(coordinates, TreeCoordinates)
         first = coordinates.start(self._u)
+        table, places, y0, start = starts
         if start == driver.UNCORRECTED:
-            rows = self._batch.run(table, places, np.repeat(first[None], len(table), axis=0))
-            return rows._replace(given=y0, y0=y0)
-        known = places < self._other.number_count
-        corrected = self._other.run(table[:, known], places[known], y0, driver.CORRECT_ONLY)
+            y = np.repeat(first[None], len(table), axis=0)
+            return self._batch.run(starts._replace(y0=y))._replace(given=y0, y0=y0)
+        known = places < len(numbers_of(self._other.evaluator))
+        to_correct = Starts(table[:, known], places[known], y0, driver.CORRECT_ONLY)
+        corrected = self._other.run(to_correct)
         y = coordinates.starts(self._u, u_from_y(corrected.y0))
-        rows = self._batch.run(table, places, y)
+        rows = self._batch.run(Starts(table, places, y))
         rows.diagnostics[:, :STARTING] = corrected.diagnostics[:, :STARTING]
         moved, turned = distance(
             u_from_y(corrected.y0), self._u, self._batch.evaluator.model.body_count

@@ -122,13 +122,17 @@ class ParameterMap:
         body = system.par.size + n * BODY_WIDTH
         metric = system.par.size + system.body.size + n * METRIC_WIDTH
         assert JP == MASS + 1
+        inertias = []  # numbers of the coordinates, where they have some
+        if len(self._bodies):
+            first = system.par.size + system.body.size + system.metric.size
+            inertias.append(first + evaluator.coordinates.inertia_places(1 + self._bodies))
         self.places = np.concatenate(
             [
                 counters,
                 [target for p in self.parameters for target in p.targets],
                 (body + MASS + np.arange(10)).ravel(),
                 (metric + np.arange(METRIC_CONSTANTS)).ravel(),
-                *self._inertia_places(),
+                *inertias,
             ]
         ).astype(np.int64)
 
@@ -255,8 +259,11 @@ class ParameterMap:
             raise NotCopiedError
         if type_.prepare_functions is not TypeBase.prepare_functions:
             raise NotCopiedError
-        if table == "joints" and self._has_angle(name):
-            raise NotCopiedError  # its axis may depend on the number
+        if table == "joints":
+            model = self._evaluator.model
+            assert model.joint_angles is not None
+            if model.joint_names.index(name) in model.joint_angles.coordinates[:, 0]:
+                raise NotCopiedError  # the axis of its angle may depend on the number
         if field.endswith(TOLERANCE) and field.removesuffix(TOLERANCE) in type_.state_lengths():
             raise NotCopiedError
         # with another value another variant may apply
@@ -268,12 +275,6 @@ class ParameterMap:
         targets = tuple(self._targets(instance, field, parameter.index))
         limits = spec if spec.kind == "number" else None
         return MappedParameter(parameter.path, parameter.index, targets, limits, table != "forces")
-
-    def _has_angle(self, joint: str) -> bool:
-        """True if an angle of a joint is counted."""
-        model = self._evaluator.model
-        assert model.joint_angles is not None
-        return model.joint_names.index(joint) in model.joint_angles.coordinates[:, 0]
 
     def _is_smooth_in_time(self, function: Instance) -> bool:
         """True for a function of time alone, without breaks at which a step has to end."""
@@ -328,14 +329,6 @@ class ParameterMap:
             if id(group) not in seen:
                 seen.add(id(group))
                 yield group, int(self._evaluator.system.groups[q, 1])
-
-    def _inertia_places(self) -> Iterator[Integers]:
-        """Entries of masses and inertias in numbers of the coordinates, where they have some."""
-        evaluator = self._evaluator
-        if len(self._bodies):
-            system = evaluator.system
-            first = system.par.size + system.body.size + system.metric.size
-            yield first + evaluator.coordinates.inertia_places(1 + self._bodies)
 
     def _inertias(self, values: Floats) -> tuple[Floats, Floats, Booleans]:
         """Masses (k, b), inertia matrices (k, b, 3, 3) of bodies that vary; (k,) True if valid."""

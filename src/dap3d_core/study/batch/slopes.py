@@ -71,7 +71,7 @@ class DifferentiatedBatch:
         """Rows of a point and (nt, width, p) their derivatives; arguments of one point."""
         batch, of = self._batch, self._differentiation
         if self._points is None or not np.array_equal(self._points.places, start.places):
-            self._points = batch.points(start.table, start.places, start.y0, start.start)
+            self._points = batch.points(start)
         points = self._points
         arguments = batch.arguments(points)
         for argument in arguments:

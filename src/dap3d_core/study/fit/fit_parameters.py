@@ -56,9 +56,9 @@ def read_parameters(
     mistakes: list[Mistake] = []
     known: tuple[SceneParameter, ...] = ()
     try:
-        known = parameters_named(checked, list(values))
+        known = parameters_named(checked, list(values), "parameters")
     except SceneError as error:
-        mistakes += [attrs.evolve(m, key="parameters") for m in error.mistakes]
+        mistakes += error.mistakes
     starts = {parameter.name: parameter.value for parameter in known}
     parameters = {n: _parameter(n, value, starts, mistakes) for n, value in values.items()}
     what = "this is a setting of the run, not a number of the mechanism"

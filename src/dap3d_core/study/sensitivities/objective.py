@@ -19,16 +19,14 @@ from dap3d_core.result import Result, ResultError, UnknownNameError, find
 from dap3d_core.scene import Mistake, Scene, SceneError
 from dap3d_core.simulation import CompiledModel, simulate
 from dap3d_core.simulation.output.check_outputs import probe_of
-from dap3d_core.study.outputs import REDUCTIONS
-from dap3d_core.study.parameters import parameters_named, with_values
-from dap3d_core.study.sensitivities.sensitivities import no_names, sensitivities
+from dap3d_core.study.outputs import REDUCTIONS, unknown_quantity
+from dap3d_core.study.parameters import with_values
+from dap3d_core.study.sensitivities.sensitivities import parameters_by, sensitivities
 
 #: Arguments of ``sensitivities`` that are no settings.
 OWN = ("scene", "by", "allow_code", "announce")
 #: Name of the output that an expression becomes.
 NAME = "objective"
-
-
 #: Numbers of a quantity over a run, by their names.
 NUMBERS: dict[str, Callable[[Floats, Floats], Any]] = {
     **{name: REDUCTIONS[name] for name in ("mean", "max", "min", "end")},
@@ -65,12 +63,7 @@ class Objective:
         self._quantity = self._named(quantity.strip(), of, allow_code)
         compiled = self._compiled(self._scene, allow_code)
         self._registry = compiled.checked.registry
-        try:
-            self._parameters = parameters_named(compiled.checked, by)
-        except SceneError as error:
-            raise SceneError(
-                [Mistake("by", m.value, m.what, m.nearest, m.remedy) for m in error.mistakes]
-            ) from None
+        self._parameters = parameters_by(compiled.checked, by)
         self.names = tuple(by)
         self.x0 = np.array([float(p.value or 0.0) for p in self._parameters])
         self.runs = self.gradients = 0
@@ -137,9 +130,7 @@ class Objective:
             components = find(probe, quantity).components
         except (UnknownNameError, ResultError) as error:
             if not any(sign in quantity for sign in "+-*/( "):
-                near = getattr(error, "nearest", "")
-                what = str(error.args[0] if error.args else error)
-                raise SceneError([Mistake("of", of, what, near)]) from None
+                raise SceneError([unknown_quantity("of", of, error)]) from None
             name = NAME
             while name in self._scene.outputs:
                 name += "_"
@@ -186,8 +177,6 @@ def objective(
         if name not in known:
             hint = did_you_mean(name, known, "{} ")
             raise TypeError(f"objective takes no {name}; {hint}settings: {', '.join(known)}")
-    if not names:
-        raise no_names()
     return Objective(own, names, of, settings, allow_code)
 
 

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, Unpack
 
-import attrs
 import numpy as np
 
 from dap3d_core.formulations.programs.change_over import ChangeOver
@@ -18,7 +17,7 @@ from dap3d_core.kernels.runtime.lanes import Differentiation
 from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.suggestions import some
 from dap3d_core.result import Result, ResultError, RunMetadata, find
-from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
+from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, ValidatedScene
 from dap3d_core.settings import RunSettings
 from dap3d_core.simulation import CompiledModel, SimulationError
 from dap3d_core.simulation.errors import refuse_collisions
@@ -234,7 +233,7 @@ def sensitivities(
     """
     compiled = compiled_for(scene, allow_code, announce, **settings)
     refuse_collisions(compiled.model, "a run with derivatives")
-    parameters = _parameters(compiled, [by] if isinstance(by, str) else list(by))
+    parameters = parameters_by(compiled.checked, [by] if isinstance(by, str) else list(by))
     check_differentiable(parameters, "by")
     given: dict[str, Any] = {**settings, "start": start_word(start)}
     method = given.pop("method", None)
@@ -301,24 +300,16 @@ def _notes(compiled: CompiledModel, runs: "Sequence[DifferentiatedRun]") -> list
     ]
 
 
-def no_names() -> SceneError:
-    """The error that no parameters are named."""
-    what = "name a parameter of the scene, such as bodies.crank.mass"
-    return SceneError([Mistake("by", MISSING, what)])
-
-
-def _parameters(compiled: CompiledModel, names: Sequence[str]) -> tuple[SceneParameter, ...]:
-    """The parameters of these names.
+def parameters_by(checked: ValidatedScene, names: Sequence[str]) -> tuple[SceneParameter, ...]:
+    """The parameters that an argument ``by`` names.
 
     Raises:
         SceneError: there are none, or wrong names, with the nearest.
     """
     if not names:
-        raise no_names()
-    try:
-        return parameters_named(compiled.checked, names)
-    except SceneError as error:
-        raise SceneError([attrs.evolve(m, key="by") for m in error.mistakes]) from None
+        what = "name a parameter of the scene, such as bodies.crank.mass"
+        raise SceneError([Mistake("by", MISSING, what)])
+    return parameters_named(checked, names, "by")
 
 
 class DifferentiatedRun(Run):

@@ -202,6 +202,11 @@ class InMemory:
         self._notes[places] = batch.notes
         self._status[places] = batch.status
 
+    def finish(self) -> None:
+        """As of ``SweepFile``: there is nothing to write."""
+
+    leave = finish
+
     def dataset(self) -> "xarray.Dataset":
         """Content so far."""
         layout = self.layout
@@ -258,8 +263,7 @@ def _opened(file: Path) -> "xarray.Dataset":
         found = xarray.open_dataset(
             file, engine="netcdf4", decode_times=False, decode_timedelta=False
         )
-        varied = [one["name"] for one in json.loads(found.attrs["varied"])]
-        found = found.set_coords([name for name in varied if name in found])
+        found = found.set_coords([name for name in varied_of(found) if name in found])
         found = found.drop_encoding()  # how a file holds it is no property of the data
         if found.nbytes <= LARGE:
             with found:
@@ -273,23 +277,39 @@ def _with_names(sweep: "Sweep") -> "Sweep":
     """A sweep whose dimension of derivatives has the names of the parameters."""
     if PARAMETER not in sweep.dims:
         return sweep
-    names = [one["name"] for one in json.loads(sweep.attrs["varied"])]
-    return sweep.assign_coords({PARAMETER: names})
+    return sweep.assign_coords({PARAMETER: list(varied_of(sweep))})
+
+
+def varied_of(data: "xarray.Dataset") -> dict[str, Any]:
+    """Name of each number that varies in a sweep, and how it was given.
+
+    Raises:
+        ValueError: the data set is of no sweep.
+    """
+    if SWEEP not in data.attrs:
+        raise ValueError(
+            f"the data set is of no sweep: it has no attribute {SWEEP}; dap.sweep and "
+            "dap.open_sweep give one (keep_attrs=True keeps attributes in xarray)"
+        )
+    try:
+        return {str(one["name"]): one.get("spec", "") for one in json.loads(data.attrs["varied"])}
+    except (KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"the sweep does not say what varies: {error}") from error
 
 
 def is_sweep(path: str | os.PathLike[str]) -> bool:
     """True if the file exists and is that of a sweep."""
+
+    def has_points(file: Path) -> bool:
+        check_checksums(file)
+        with reading(file), opened(file) as dataset:
+            return SWEEP in dataset.ncattrs()
+
     try:
         check_signature(Path(path))
-        return bool(_patiently(Path(path), lambda file: SWEEP in _attributes_of(file)))
+        return _patiently(Path(path), has_points)
     except ResultError:
         return False
-
-
-def _attributes_of(file: Path) -> list[str]:
-    check_checksums(file)
-    with reading(file), opened(file) as dataset:
-        return list(dataset.ncattrs())
 
 
 def check_format(file: Path, dataset: Any) -> None:
@@ -367,10 +387,9 @@ class Sweep(xarray.Dataset):  # type: ignore[no-untyped-call]
     def _varied(self) -> list[str]:
         """Names of the numbers that vary here."""
         try:
-            names = [str(one["name"]) for one in json.loads(self.attrs["varied"])]
-        except (KeyError, TypeError, ValueError):
+            return [name for name in varied_of(self) if name in self.coords]
+        except ValueError:
             return []
-        return [name for name in names if name in self.coords]
 
 
 def _ends(values: Any) -> tuple[Any, Any]:

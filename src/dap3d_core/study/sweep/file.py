@@ -5,20 +5,30 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.kernels.array_types import Integers
 from dap3d_core.result import ResultError
-from dap3d_core.result.file.atomic_write import cannot, put_in_place
+from dap3d_core.result.file.atomic_write import cannot, put_in_place, synchronise
 from dap3d_core.result.file.checksum import WHOLE, check_checksums, check_signature, write_checksums
-from dap3d_core.result.file.library import NETCDF, guarded, opened, reading
-from dap3d_core.result.file.schema import write_attributes
+from dap3d_core.result.file.library import NETCDF, created, opened, reading, writing
+from dap3d_core.result.file.schema import new_variable, write_attributes
 from dap3d_core.result.file.write import GrowingFile
 from dap3d_core.study.study import Batch, PointStatus
-from dap3d_core.study.sweep.dataset import ABOUT_NOTE, ABOUT_STATUS, SweepLayout, check_format
+from dap3d_core.study.sweep.dataset import (
+    ABOUT_NOTE,
+    ABOUT_STATUS,
+    SweepLayout,
+    Variable,
+    check_format,
+    open_sweep,
+)
+
+if TYPE_CHECKING:
+    import xarray
 
 #: Seconds, and bytes of values, after which points are written.
 EVERY, MOST_WAITING = 2.0, 2**26
@@ -71,7 +81,7 @@ class SweepFile(GrowingFile):
         self._waiting: list[tuple[Integers, Batch]] = []
         self._is_empty = not resume
         self._due = time.monotonic() + EVERY
-        self._claim = FileLock(self.target)
+        self._claim, self._file = FileLock(self.target), self.part
         try:
             with NETCDF:
                 if resume:
@@ -110,8 +120,10 @@ class SweepFile(GrowingFile):
         """
         self._write(PATIENCE)
         # numbers lie between descriptions here: of a large file the first bytes are compared
-        guarded(self.part, lambda: write_checksums(self.part, WHOLE, is_whole=True))
+        with writing(self.part):
+            write_checksums(self.part, WHOLE, is_whole=True)
         put_in_place(self.part, self.target, self._force)
+        self._file = self.target
         self._claim.release()
 
     def leave(self) -> None:
@@ -126,6 +138,14 @@ class SweepFile(GrowingFile):
                 self.part.unlink(missing_ok=True)
         finally:
             self._claim.release()
+
+    def dataset(self) -> "xarray.Dataset":
+        """Content of the file; of its part before it is complete.
+
+        Raises:
+            ResultError: it cannot be read.
+        """
+        return open_sweep(self._file)
 
     def _write(self, patience: float) -> None:
         """Writes all stored results to the disk.
@@ -152,19 +172,20 @@ class SweepFile(GrowingFile):
             status = np.concatenate([batch.status for batch in batches])[order]
             notes = np.array([note for b in batches for note in b.notes], dtype=object)[order]
             noted = notes != ""
-
-            def write_values() -> None:
+            with writing(self.part):
                 for name in names:
                     self._write_at(dataset.variables[name], places, values[name])
                 if noted.any():
                     letters = note_letters(notes[noted])
                     self._write_at(dataset.variables["note"], places[noted], letters)
-
-            def write_status() -> None:
+                self._to_disk(dataset)
                 self._write_at(dataset.variables["status"], places, status)
-
-            self._append(dataset, write_values, write_status, durable=True)
+                self._to_disk(dataset)
         self._waiting.clear()
+
+    def _to_disk(self, dataset: Any) -> None:
+        dataset.sync()
+        synchronise(self.part)
 
     @contextmanager
     def _opened(self, patience: float) -> Iterator[Any]:
@@ -185,7 +206,8 @@ class SweepFile(GrowingFile):
         try:
             yield dataset
         finally:
-            guarded(self.part, dataset.close)
+            with writing(self.part):
+                dataset.close()
 
     def _write_at(self, variable: Any, places: Integers, values: NDArray[Any]) -> None:
         """Writes values of points (k, ...) with rising indices."""
@@ -208,11 +230,13 @@ class SweepFile(GrowingFile):
                 )
             self._check_part("cannot overwrite")
             self.part.unlink()
-        part = self._create(lambda dataset: define(dataset, self.layout))
-        if part != self.part:  # another process was quicker
-            part.unlink()
+        wanted = self.part
+        with self._new_part() as new, created(new, self.target) as dataset:
+            define(dataset, self.layout)
+        if self.part != wanted:  # another process was quicker
+            self.part.unlink()
             raise ResultError(
-                f"cannot write {self.target}: another sweep has just begun {self.part.name}"
+                f"cannot write {self.target}: another sweep has just begun {wanted.name}"
             )
 
     def _stored_status(self) -> NDArray[np.int8]:
@@ -370,27 +394,25 @@ def define(dataset: Any, layout: SweepLayout) -> None:
         dataset.createDimension(name, length)
     dataset.createDimension("note_length", NOTE)
     for coordinate in layout.coordinates:
-        variable = _variable(dataset, coordinate.name, "f8", coordinate.dimensions, False)
-        write_attributes(variable, coordinate.about)
+        variable = _variable(dataset, coordinate, "f8")
         variable[...] = coordinate.values
     names = [c.name for c in layout.coordinates if c.name not in layout.sizes]
     last = (-1,) * len(layout.dimensions)
     for output in layout.outputs:
-        variable = _variable(dataset, output.name, "f8", output.dimensions, np.nan)
-        write_attributes(variable, output.about)
+        variable = _variable(dataset, output, "f8", np.nan)
         if names and not any(" " in name for name in names):
             variable.setncattr_string("coordinates", " ".join(names))
         variable[(-1,) * len(output.dimensions)] = np.nan  # allocates it
-    status = _variable(dataset, "status", "i1", layout.dimensions, False)
-    write_attributes(status, ABOUT_STATUS)
+    status = _variable(dataset, Variable("status", layout.dimensions, ABOUT_STATUS), "i1")
     status[last] = PointStatus.OPEN
-    note = _variable(dataset, "note", "S1", (*layout.dimensions, "note_length"), False)
+    dimensions = (*layout.dimensions, "note_length")
+    note = _variable(dataset, Variable("note", dimensions, ABOUT_NOTE), "S1")
     note.set_auto_chartostring(False)
-    write_attributes(note, ABOUT_NOTE)
     note.setncattr("_Encoding", "utf-8")
     note[(*last, -1)] = b""
     write_attributes(dataset, layout.attributes)
 
 
-def _variable(dataset: Any, name: str, kind: str, dimensions: tuple[str, ...], fill: Any) -> Any:
-    return dataset.createVariable(name, kind, dimensions, fill_value=fill, contiguous=True)
+def _variable(dataset: Any, variable: Variable, kind: str, fill: Any = False) -> Any:
+    name, dimensions, about = variable.name, variable.dimensions, variable.about
+    return new_variable(dataset, name, kind, dimensions, about, fill, contiguous=True)

@@ -17,7 +17,7 @@ from dap3d_core.study.design import Design, design_of
 from dap3d_core.study.ensemble import Ensemble
 from dap3d_core.study.outputs import outputs_of
 from dap3d_core.study.study import Study
-from dap3d_core.study.sweep.dataset import InMemory, layout_of, open_sweep
+from dap3d_core.study.sweep.dataset import InMemory, layout_of
 from dap3d_core.study.sweep.file import NOTE, SweepFile
 from dap3d_core.study.workers.threads import RunPoints, run_here
 
@@ -193,16 +193,13 @@ class _Runner:
             store = SweepFile(layout, output, force=self.force, resume=self.resume)
         try:
             self._run_points(ensemble, points, store)
-            if isinstance(store, SweepFile):
-                store.finish()
+            store.finish()
         except BaseException as error:
             with suppress(ResultError):
-                if isinstance(store, SweepFile):
-                    store.leave()
-                partial = store.dataset() if isinstance(store, InMemory) else open_sweep(store.part)
-                Computed(partial).attach(error)
+                store.leave()
+                Computed(store.dataset()).attach(error)
             raise
-        return store.dataset() if isinstance(store, InMemory) else open_sweep(store.target)
+        return store.dataset()
 
     def _check_options(self, output: str | os.PathLike[str] | None) -> None:
         mistakes = []

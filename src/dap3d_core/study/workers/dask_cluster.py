@@ -28,7 +28,7 @@ from dap3d_core.study.workers.environment import (
     version_differences,
     with_absolute_path,
 )
-from dap3d_core.study.workers.threads import ChunkSize, RunPoints
+from dap3d_core.study.workers.threads import ChunkSize, RunPoints, timed_run
 
 #: Seconds that a task should take: much longer than its transport of some milliseconds.
 TASK_SECONDS = 1.0
@@ -290,10 +290,7 @@ class _ClusterMonitor:
 
 def run_points(payload: bytes, digest: str, points: Floats) -> tuple[Batch, float]:
     """The task of a worker: run points. Returns their outputs and the seconds they took."""
-    ensemble = _ensemble(payload, digest)
-    begun = time.perf_counter()
-    batch = ensemble.run(points)
-    return batch, time.perf_counter() - begun
+    return timed_run(_ensemble(payload, digest), points)
 
 
 #: Compiled studies of a worker's process by their digest, the last one used at the end.

@@ -97,14 +97,19 @@ class ChunkSize:
         return max(1, min(int(wanted), self._most, left))
 
 
+def timed_run(ensemble: Ensemble, points: Floats) -> tuple[Batch, float]:
+    """Outputs of points, and the seconds that they took."""
+    begun = time.perf_counter()
+    return ensemble.run(points), time.perf_counter() - begun
+
+
 def _run_serially(ensemble: Ensemble, points: Floats, index: Integers) -> Iterator[RunPoints]:
     chunks = ChunkSize(CHUNK_SECONDS, 1)
     while len(index):
         size = chunks.next(len(index))
         chunk, index = index[:size], index[size:]
-        begun = time.perf_counter()
-        batch = ensemble.run(points[chunk])
-        chunks.update(size, time.perf_counter() - begun)
+        batch, seconds = timed_run(ensemble, points[chunk])
+        chunks.update(size, seconds)
         yield chunk, batch
 
 
@@ -155,12 +160,11 @@ def _start(count: int, threads: list[threading.Thread], arguments: tuple[Any, ..
 def _work(ensemble: Ensemble, points: Floats, tasks: Any, done: Any) -> None:
     """Run chunks until there is none."""
     while (chunk := tasks.get()) is not None:
-        begun = time.perf_counter()
         try:
-            batch: Any = ensemble.run(points[chunk])
+            found: tuple[Any, float] = timed_run(ensemble, points[chunk])
         except BaseException as error:  # raised again by _run_threads
-            batch = error
-        done.put((chunk, batch, time.perf_counter() - begun))
+            found = error, 0.0
+        done.put((chunk, *found))
 
 
 def _stop(threads: list[threading.Thread], tasks: Any) -> None:

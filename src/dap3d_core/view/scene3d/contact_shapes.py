@@ -1,12 +1,12 @@
 """What contacts touch with, as shapes of their bodies."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from dap3d_core.model import Model
-from dap3d_core.model.groups import Floats, Group
+from dap3d_core.model.groups import Group
 from dap3d_core.scene.validate.shapes import Shape
 from dap3d_core.view.scene3d.primitives import floats_of
 
@@ -38,7 +38,7 @@ def _of_contact(group: Group, k: int, name: str) -> Iterator[Shape]:
             field: numbers.get(f"{field}_{slot}", numbers.get(field))
             for field in ("P", "Q", "a", "radius", "length", "size", "samples", "is_closed")
         }
-        for type_, values in DRAWINGS[kind](own):
+        for type_, values in _drawn(kind, own):
             fields = {field: _plain(value) for field, value in values.items()}
             yield Shape(name, type_, bodies[slot], fields)
 
@@ -50,59 +50,36 @@ def _plain(value: Any) -> Any:
     return floats_of(value) if value.ndim else float(value)
 
 
-Pieces = Iterator[tuple[str, dict[str, Any]]]
-Own = Mapping[str, Any]
+def _drawn(kind: str, own: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Types of shapes and their fields that draw a surface.
 
-
-def _sphere(own: Own) -> Pieces:
-    if own["radius"] > 0.0:
-        yield "sphere", {"radius": own["radius"], "at": own["P"]}
-
-
-def _shell(own: Own) -> Pieces:
-    """Three circles: a ball may be inside."""
-    s = np.linspace(0.0, 2.0 * np.pi, CORNERS + 1)
-    circle = own["radius"] * np.stack([np.cos(s), np.sin(s), 0.0 * s])
-    for turn in range(3):
-        yield "line", {"points": own["P"] + np.roll(circle, turn, axis=0).T}
-
-
-def _box(own: Own) -> Pieces:
-    yield "box", {"size": own["size"], "at": own["P"]}
-
-
-def _disk(own: Own) -> Pieces:
-    yield "disk", {"radius": own["radius"], "axis": own["a"], "at": own["P"]}
-
-
-def _cylinder(own: Own) -> Pieces:
-    size = {field: own[field] for field in ("radius", "length")}
-    yield "cylinder", {**size, "axis": own["a"], "at": own["P"]}
-
-
-def _capsule(own: Own) -> Pieces:
-    along: Floats = own["Q"] - own["P"]
-    if own["radius"] > 0.0:
-        length = float(np.linalg.norm(along))
-        at = 0.5 * (own["P"] + own["Q"])
-        yield "capsule", {"radius": own["radius"], "length": length, "axis": along, "at": at}
-
-
-def _curve(own: Own) -> Pieces:
-    """The line through the points that its type looks from; none of a curve without ends."""
-    points = own["samples"][:, 1:]
-    if np.ptp(points, axis=0).any():
-        points = np.vstack([points, points[: int(own["is_closed"])]])
-        yield "line", {"points": own["P"] + points}
-
-
-#: Kind of a surface (``interface.contacts.contact.SURFACES``) -> what draws it.
-DRAWINGS: dict[str, Callable[[Own], Pieces]] = {
-    "sphere": _sphere,
-    "shell": _shell,
-    "box": _box,
-    "disk": _disk,
-    "cylinder": _cylinder,
-    "capsule": _capsule,
-    "curve": _curve,
-}
+    Args:
+        kind: one of ``interface.contacts.contact.SURFACES``.
+        own: its fields.
+    """
+    at, axis, radius = own["P"], own["a"], own["radius"]
+    match kind:
+        case "sphere":
+            if radius > 0.0:
+                yield "sphere", {"radius": radius, "at": at}
+        case "shell":  # three circles: a ball may be inside
+            s = np.linspace(0.0, 2.0 * np.pi, CORNERS + 1)
+            circle = radius * np.stack([np.cos(s), np.sin(s), 0.0 * s])
+            for turn in range(3):
+                yield "line", {"points": at + np.roll(circle, turn, axis=0).T}
+        case "box":
+            yield "box", {"size": own["size"], "at": at}
+        case "disk":
+            yield "disk", {"radius": radius, "axis": axis, "at": at}
+        case "cylinder":
+            yield "cylinder", {"radius": radius, "length": own["length"], "axis": axis, "at": at}
+        case "capsule":
+            if radius > 0.0:
+                along, middle = own["Q"] - at, 0.5 * (at + own["Q"])
+                length = float(np.linalg.norm(along))
+                yield "capsule", {"radius": radius, "length": length, "axis": along, "at": middle}
+        case "curve":  # the line through the points that its type looks from
+            points = own["samples"][:, 1:]
+            if np.ptp(points, axis=0).any():  # a curve without ends has none
+                points = np.vstack([points, points[: int(own["is_closed"])]])
+                yield "line", {"points": at + points}

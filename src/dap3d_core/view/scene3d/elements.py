@@ -42,6 +42,11 @@ class ElementGeometry:
     has_ends: bool
     chain: list[Located]
 
+    @property
+    def moving(self) -> tuple[int, ...]:
+        """Indices of its bodies without ground."""
+        return tuple(body for body in self.bodies.values() if body)
+
     def place(self, slot: str) -> Located:
         """The element's point on the body of a slot, the origin where it has none."""
         return self.points.get(slot, (self.bodies[slot], ORIGIN))

@@ -74,27 +74,14 @@ def turned_to(axis: Any) -> tuple[float, ...]:
     return tuple(map(float, (w, -0.5 * y / w, 0.5 * x / w, 0.0)))
 
 
-def rod(
-    layer: str, body: int, start: Any, end: Any, radius: float, color: str = "", owner: str = ""
-) -> Mark:
-    """A cylinder between two points (3,) of one body."""
-    a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
-    length = float(np.linalg.norm(b - a))
-    size = (radius, radius, length)
-    return Mark(
-        layer, "cylinder", body, floats_of(0.5 * (a + b)), size, turned_to(b - a), color, owner
-    )
-
-
 def bar(body: int, at: Any, axis: Any, radius: float, length: float) -> Mark:
     """A cylinder about a point (3,) of a body, along a direction (3,)."""
     return Mark("", "cylinder", body, floats_of(at), (radius, radius, length), turned_to(axis))
 
 
-def ball(layer: str, body: int, at: Any, radius: float, color: str = "", owner: str = "") -> Mark:
+def ball(body: int, at: Any, radius: float) -> Mark:
     """A sphere at a point (3,) of a body."""
-    size = (radius, radius, radius)
-    return Mark(layer, "sphere", body, floats_of(at), size, color=color, owner=owner)
+    return Mark("", "sphere", body, floats_of(at), (radius, radius, radius))
 
 
 def floats_of(values: Any) -> tuple[float, ...]:

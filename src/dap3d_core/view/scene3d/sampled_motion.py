@@ -87,12 +87,6 @@ class Motion:
             return np.broadcast_to(np.asarray(local, dtype=float), (len(self.result.t), 3))
         return np.asarray(to_global(self.result.p[:, body - 1], np.asarray(local, dtype=float)))
 
-    def point_in(self, body: int, point: Floats) -> Floats:
-        """(3,) coordinates in a body of a global point (3,) at the first instant."""
-        if body == 0:
-            return point
-        return self.vector_in(body, point - self.result.r[0, body - 1])
-
     def vector_in(self, body: int, direction: Floats) -> Floats:
         """(3,) components in a body of a global direction (3,) at the first instant."""
         if body == 0:

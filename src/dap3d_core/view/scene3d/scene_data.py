@@ -1,7 +1,7 @@
 """Solids that show a result: bodies, shapes, joints, forces, ground; and the camera."""
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -26,7 +26,6 @@ from dap3d_core.view.scene3d.primitives import (
     bar,
     floats_of,
     pack,
-    rod,
     turned_to,
 )
 from dap3d_core.view.scene3d.sampled_motion import Extent, Motion, stage
@@ -39,7 +38,7 @@ _SAME = 1e-6
 #: One calm colour for all joints, one for springs; bodies have colours of their own.
 JOINT, FORCE = "#5b6470", "#8a6d3b"
 
-Pieces = Iterator[Mark | Span]
+Pieces = Iterable[Mark | Span]
 
 
 def scene_of(result: Result, model: str | os.PathLike[str] | None = None) -> Scene:
@@ -80,7 +79,8 @@ class SceneGeometry:
 def scene_geometry(result: Result, scene: Scene, elements: Elements) -> SceneGeometry:
     """The solids of a result with its scene, whose folder, where known, holds its meshes."""
     summary, motion = result.summary, Motion(result)
-    hues = colors([scene.bodies[n].color for n in summary.body_names], _pairs(elements.joints))
+    named = [scene.bodies[name].color for name in summary.body_names]
+    hues = colors(named, [joint.moving for joint in elements.joints])
     shapes = scene_shapes(scene, summary.body_names, hues, elements.surfaces)
     every = [*elements.joints, *elements.contacts, *elements.forces]
     points = attachment_points(summary, every)
@@ -102,11 +102,6 @@ def scene_geometry(result: Result, scene: Scene, elements: Elements) -> SceneGeo
     marks += [*symbols, *shapes.marks, *(p for p in pieces if isinstance(p, Mark))]
     spans = [p for p in pieces if isinstance(p, Span)]
     return SceneGeometry(summary.body_names, hues, marks, spans, shapes, extent, unit)
-
-
-def _pairs(joints: Iterable[ElementGeometry]) -> list[tuple[int, ...]]:
-    """The bodies of each joint, without ground."""
-    return [tuple(body for body in joint.bodies.values() if body) for joint in joints]
 
 
 def geometry_of(result: Result, scene: Scene, elements: Elements) -> dict[str, Any]:
@@ -161,17 +156,22 @@ def _bodies(
 def _bare_bodies(
     result: Result, bare: list[int], joints: list[ElementGeometry], size: float, hues: Sequence[str]
 ) -> list[Mark]:
-    """Bodies without points; a wheel is drawn by its joint."""
+    """Bodies without points: their ellipsoids of inertia, and axes, which show that they turn.
+
+    A wheel is drawn by its joint.
+    """
     summary = result.summary
     wheels = {j.bodies["i"] for j in joints if j.symbol == "wheel"}
     most = MODEST * size if size > 0.0 else np.inf
-    columns = zip(summary.mass, summary.Jp, hues, summary.body_names, strict=True)
-    return [
-        mark
-        for k, (mass, Jp, hue, name) in enumerate(columns, 1)
-        if k in bare and k not in wheels
-        for mark in bare_body(k, mass, Jp, most, hue, name)
-    ]
+    marks: list[Mark] = []
+    for k in (k for k in bare if k not in wheels):
+        mass, Jp = summary.mass[k - 1], summary.Jp[k - 1]
+        hue, name = hues[k - 1], summary.body_names[k - 1]
+        ellipsoid = inertia_ellipsoid(k, mass, Jp, most, hue, name)
+        reach = max(ellipsoid.size)
+        arms = [floats_of(axis) for axis in 1.5 * reach * np.eye(3)]
+        marks += [ellipsoid, *links(k, arms, 0.06 * reach, hue, name)]
+    return marks
 
 
 def _points(result: Result) -> list[dict[str, Any]]:
@@ -237,10 +237,12 @@ def links(body: int, points: list[Point], unit: float, color: str, name: str,
 
     ``ends`` are the points that have a ball, as no joint is drawn there.
     """
-    marks = [rod("bodies", body, ORIGIN, at, unit, color=color, owner=name) for at in points]
-    marks.append(ball("bodies", body, ORIGIN, 1.5 * unit, color=color, owner=name))
-    marks += [ball("bodies", body, at, 1.25 * unit, color=color, owner=name) for at in ends]
-    return marks
+    marks = [
+        bar(body, 0.5 * np.add(ORIGIN, at), at, unit, float(np.linalg.norm(at))) for at in points
+    ]
+    marks.append(ball(body, ORIGIN, 1.5 * unit))
+    marks += [ball(body, at, 1.25 * unit) for at in ends]
+    return [attrs.evolve(mark, layer="bodies", color=color, owner=name) for mark in marks]
 
 
 def inertia_ellipsoid(body: int, mass: float, Jp: Floats, most: float, color: str,
@@ -256,17 +258,6 @@ def inertia_ellipsoid(body: int, mass: float, Jp: Floats, most: float, color: st
     semi *= min(1.0, most / semi.max())
     axes[:, 2] *= np.sign(np.linalg.det(axes))
     return Mark("inertia", "sphere", body, ORIGIN, floats_of(semi), quaternion(axes), color, name)
-
-
-def bare_body(body: int, mass: float, Jp: Floats, most: float, color: str, name: str) -> list[Mark]:
-    """A body without points: its ellipsoid of inertia, and its axes, which show that it turns.
-
-    Arguments as ``inertia_ellipsoid``.
-    """
-    ellipsoid = inertia_ellipsoid(body, mass, Jp, most, color, name)
-    reach = max(ellipsoid.size)
-    arms = [floats_of(axis) for axis in 1.5 * reach * np.eye(3)]
-    return [ellipsoid, *links(body, arms, 0.06 * reach, color, name)]
 
 
 @attrs.frozen(eq=False)
@@ -304,7 +295,10 @@ class Drawer:
 
     def start(self, body: int, point: Located) -> Located:
         """A point of another body at the first instant, in coordinates of a body."""
-        return body, floats_of(self.motion.point_in(body, self.motion.points([point])[0, 0]))
+        at = self.motion.points([point])[0, 0]
+        if body:
+            at = self.motion.vector_in(body, at - self.motion.result.r[0, body - 1])
+        return body, floats_of(at)
 
     def home(self, one: ElementGeometry, body: int) -> Located:
         """The point on a body of an element without points.
@@ -316,7 +310,7 @@ class Drawer:
         for other in self.joints:
             if other is not one and other.points and set(other.bodies.values()) == between:
                 return self.start(body, next(iter(other.points.values())))
-        return self.start(body, (next((b for b in one.bodies.values() if b), 0), ORIGIN))
+        return self.start(body, (next(iter(one.moving), 0), ORIGIN))
 
     def base(self, one: ElementGeometry, field: str) -> Located:
         """The start of the vector of a field: the point of its slot, or the home."""
@@ -332,19 +326,14 @@ class Drawer:
 def _ball(to: Drawer, one: ElementGeometry) -> Pieces:
     """A ball at the point; of an element without points around that of its joint."""
     if one.points:
-        yield ball("", *one.place("i"), 1.8 * to.unit)
+        yield ball(*one.place("i"), 1.8 * to.unit)
     else:
-        yield ball("", *to.home(one, one.bodies["i"]), 2.6 * to.unit)
-
-
-def _block(to: Drawer, one: ElementGeometry) -> Pieces:
-    edge = 4.5 * to.unit
-    yield Mark("", "box", one.bodies["i"], ORIGIN, (edge, edge, edge))
+        yield ball(*to.home(one, one.bodies["i"]), 2.6 * to.unit)
 
 
 def _cross(to: Drawer, one: ElementGeometry) -> Pieces:
     """The two arms of the cross, each fixed in its body."""
-    yield ball("", *one.place("i"), 1.5 * to.unit)
+    yield ball(*one.place("i"), 1.5 * to.unit)
     for field in ("a_i", "n_j"):
         body, axis = one.vectors[field]
         yield bar(body, to.base(one, field)[1], axis, 0.9 * to.unit, 8.0 * to.unit)
@@ -361,13 +350,13 @@ def _hinge(to: Drawer, one: ElementGeometry) -> Pieces:
 def _link(to: Drawer, one: ElementGeometry) -> Pieces:
     start, end = one.place("i"), one.place("j")
     yield Span("", "rod", start, end, 0.8 * to.unit)
-    yield ball("", *start, 1.6 * to.unit)
-    yield ball("", *end, 1.6 * to.unit)
+    yield ball(*start, 1.6 * to.unit)
+    yield ball(*end, 1.6 * to.unit)
 
 
 def _plate(to: Drawer, one: ElementGeometry) -> Pieces:
     """A ball on the body and a plate on ground, both at the point."""
-    yield ball("", *one.place("i"), 2.0 * to.unit)
+    yield ball(*one.place("i"), 2.0 * to.unit)
     at = to.motion.points([one.place("i")])[0, 0]
     yield bar(0, at, one.vectors["a_j"][1], 7.0 * to.unit, 0.3 * to.unit)
 
@@ -376,14 +365,6 @@ def _ring(to: Drawer, one: ElementGeometry) -> Pieces:
     """A ring about the first vector, the axis of a rotation."""
     field, (_, axis) = next(iter(one.vectors.items()))
     yield Mark("", "ring", *to.base(one, field), (4.0 * to.unit,) * 3, turned_to(axis))
-
-
-def _sleeve(to: Drawer, one: ElementGeometry) -> Pieces:
-    yield from _on_rail(to, one, "cylinder", 2.2 * to.unit)
-
-
-def _slider(to: Drawer, one: ElementGeometry) -> Pieces:
-    yield from _on_rail(to, one, "box", 4.0 * to.unit)
 
 
 def _on_rail(to: Drawer, one: ElementGeometry, kind: str, width: float) -> Pieces:
@@ -399,10 +380,6 @@ def _on_rail(to: Drawer, one: ElementGeometry, kind: str, width: float) -> Piece
     yield Mark("", kind, body, at, (width, width, 6.0 * to.unit), turned_to(axis))
 
 
-def _spring(to: Drawer, one: ElementGeometry) -> Pieces:
-    yield Span("", "spring", one.place("i"), one.place("j"), 2.2 * to.unit)
-
-
 def _wheel(to: Drawer, one: ElementGeometry) -> Pieces:
     """A thin disk about the y axis of the body, with spokes that show how it turns."""
     body, R = one.bodies["i"], one.numbers["radius"]
@@ -411,7 +388,7 @@ def _wheel(to: Drawer, one: ElementGeometry) -> Pieces:
     yield bar(body, ORIGIN, y, 0.12 * R, 3.0 * (0.04 * R))
     for axis in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)):
         yield bar(body, ORIGIN, axis, 0.035 * R, 1.9 * R)
-    yield ball("", body, (0.95 * R, 0.0, 0.0), 0.1 * R)
+    yield ball(body, (0.95 * R, 0.0, 0.0), 0.1 * R)
 
 
 def _declared_fields(to: Drawer, one: ElementGeometry) -> Pieces:
@@ -421,12 +398,11 @@ def _declared_fields(to: Drawer, one: ElementGeometry) -> Pieces:
     for start, end in pairwise(one.chain):
         yield Span("", "rod", start, end, 0.5 * to.unit)
     for point in one.chain or one.points.values():
-        yield ball("", *point, 1.8 * to.unit)
+        yield ball(*point, 1.8 * to.unit)
     for field, (_, axis) in one.vectors.items():
         yield bar(*to.base(one, field), axis, 0.6 * to.unit, 12.0 * to.unit)
     if not one.points and not one.vectors:
-        bodies = [(body, ORIGIN) for body in one.bodies.values() if body]
-        for start, end in pairwise(bodies):
+        for start, end in pairwise([(body, ORIGIN) for body in one.moving]):
             yield Span("", "rod", start, end, 0.5 * to.unit)
 
 
@@ -434,14 +410,18 @@ def _declared_fields(to: Drawer, one: ElementGeometry) -> Pieces:
 DRAWINGS: dict[str, Callable[[Drawer, ElementGeometry], Pieces]] = {
     "": _declared_fields,
     "ball": _ball,
-    "block": _block,
+    "block": lambda to, one: [
+        Mark("", "box", one.bodies["i"], ORIGIN, (4.5 * to.unit,) * 3),
+    ],
     "cross": _cross,
     "hinge": _hinge,
     "link": _link,
     "plate": _plate,
     "ring": _ring,
-    "sleeve": _sleeve,
-    "slider": _slider,
-    "spring": _spring,
+    "sleeve": lambda to, one: _on_rail(to, one, "cylinder", 2.2 * to.unit),
+    "slider": lambda to, one: _on_rail(to, one, "box", 4.0 * to.unit),
+    "spring": lambda to, one: [
+        Span("", "spring", one.place("i"), one.place("j"), 2.2 * to.unit),
+    ],
     "wheel": _wheel,
 }

@@ -350,5 +350,5 @@ def test_points_whose_bodies_start_elsewhere_are_left_open():
     runner = of._runner()
     start, _ = runner._mapped_starts(runner.parameter_map, points)
     start.y0[1, :3] += (0.1, 0.0, 0.0)
-    rows = runner._runs.run(*start)
+    rows = runner._runs.run(start)
     assert rows.done.tolist() == [True, False]

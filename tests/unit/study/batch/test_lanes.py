@@ -14,6 +14,7 @@ from unit.study.batch.test_batch import pendulum as ball_pendulum
 import dap3d_core as dap
 from dap3d_core.study import Ensemble
 from dap3d_core.study.batch import lanes as study_lanes
+from dap3d_core.study.batch.compiled_batch import Starts
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="plain Python has no vectors")
 
@@ -286,8 +287,8 @@ def test_lanes_made_between_points_leave_the_numbers_of_the_scene():
     u[2] += 0.1
     y0 = evaluator.coordinates.start(u)
     before = evaluator.system.tree.constants.copy()
-    point = np.zeros((1, 0)), np.zeros(0, dtype=np.int64), y0[None]
-    assert isinstance(runner.compiled_batch._lanes_for(*point), study_lanes.LaneBatch)
+    point = Starts(np.zeros((1, 0)), np.zeros(0, dtype=np.int64), y0[None])
+    assert isinstance(runner.compiled_batch._lanes_for(point), study_lanes.LaneBatch)
     assert np.array_equal(evaluator.system.tree.constants, before)
 
 

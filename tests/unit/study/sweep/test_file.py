@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.internals import is_sweep
 from support.plain import long_in_plain_python
+from support.studies import spring
 from unit.result.file.test_checksum import REFUSED, SIZE, changed_files, no_library, written
-from unit.study.sweep.test_sweep import spring
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError

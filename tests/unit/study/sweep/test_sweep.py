@@ -8,25 +8,16 @@ import numpy as np
 import pytest
 import xarray
 from support.plain import jit_is_on
+from support.studies import LENGTH, START, spring
 
 import dap3d_core as dap
 from dap3d_core.cli.console import sweep_tables
 from dap3d_core.result import ResultError, current_versions
 from dap3d_core.study import Ensemble
 
-#: Rest length and start of the spring below, m.
-LENGTH, START = 1.0, 1.25
 TIMES = {"t_end": 0.5, "dt": 0.1}
 VARY = {"bodies.block.mass": [0.5, 2.0], "forces.spring.k": "4:16:2"}
 OUTPUTS = ["block.r.x", "block.r.x:min", "block.r.x:series", "energy.kinetic:mean"]
-
-
-def spring(mass=1.0, k=4.0):
-    """A block on a spring along x, without weight."""
-    scene = dap.Scene(name="spring")
-    scene.add_body("block", mass=mass, Jp=(1.0, 1.0, 1.0), r=(START, 0.0, 0.0))
-    scene.add_force("ptp", "spring", P_i="block.O", P_j="ground.O", k=k, l0=LENGTH)
-    return scene
 
 
 def at(t, mass, k):
