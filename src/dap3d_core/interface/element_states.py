@@ -55,12 +55,16 @@ def add_state_fields(class_: type) -> None:
             fields[f"{name}{INITIAL}"] = _initial(name, length)
             words = f"absolute tolerance of {name}; 0: that of the run"
             fields[f"{name}{TOLERANCE}"] = number(0.0, minimum=0.0, doc=words)
+    add_fields(class_, fields)
+
+
+def add_fields(class_: type, fields: Mapping[str, Any]) -> None:
+    """Give a class fields, but for those that it declares."""
     own = dict(vars(class_).get("__annotations__", {}))
     for name, field in fields.items():
-        declared = (vars(base) for base in class_.__mro__)
-        if not any(name in base.get("__annotations__", {}) for base in declared):
+        if not any(name in vars(base).get("__annotations__", {}) for base in class_.__mro__):
             setattr(class_, name, field)
-            own[name] = float
+            own[name] = Any
     class_.__annotations__ = own
 
 
@@ -97,10 +101,7 @@ def add_unknown_fields(class_: type) -> None:
     """Give a class that declares unknowns the fields of their starts and bounds."""
     if "unknowns" not in vars(class_):
         return
-    own: dict[str, Any] = dict(vars(class_).get("__annotations__", {}))
-    inherited: list[Mapping[str, Any]] = [
-        vars(base).get("__annotations__", {}) for base in class_.__mro__[1:]
-    ]
+    fields: dict[str, Any] = {}
     for name in unknown_names(class_):
         if not (isinstance(name, str) and name.isidentifier()):
             continue
@@ -109,8 +110,5 @@ def add_unknown_fields(class_: type) -> None:
             (LEAST, -UNBOUNDED, f"least value of {name}"),
             (GREATEST, UNBOUNDED, f"greatest value of {name}"),
         ):
-            field = f"{name}{suffix}"
-            if field not in own and not any(field in names for names in inherited):
-                setattr(class_, field, number(default, doc=doc))
-                own[field] = float
-    class_.__annotations__ = own
+            fields[f"{name}{suffix}"] = number(default, doc=doc)
+    add_fields(class_, fields)

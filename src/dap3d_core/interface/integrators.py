@@ -55,23 +55,21 @@ class RungeKuttaMethod:
             raise PluginError(f"{who}: b_hat has {s} weights, or {s + 1}, not {len(self.b_hat)}")
         if type(self.order) is not int or not 1 <= self.order <= s:
             raise PluginError(f"{who}: order is a whole number from 1 to {s}, not {self.order!r}")
-        for order, words, value in self._conditions(self.b, self.c):
+        for order, words, value in self._conditions():
             if order <= self.order and not abs(value) < COEFFICIENT_ROUNDING:
                 raise PluginError(f"{who} is not of order {order}: {words} is off by {value:.3g}")
         if self.b_hat and not abs(sum(self.b_hat) - 1.0) < COEFFICIENT_ROUNDING:
             raise PluginError(f"{who}: the sum of b_hat is {sum(self.b_hat):.16g}, not 1")
 
-    def _conditions(
-        self, b: Sequence[float], c: Sequence[float]
-    ) -> Iterator[tuple[int, str, float]]:
+    def _conditions(self) -> Iterator[tuple[int, str, float]]:
         """Order, formula and residual of the conditions up to order 4 (table II.2.2)."""
-        a = [(), *self.a]
+        a, c = [(), *self.a], self.c
 
         def through(x: Sequence[float]) -> list[float]:
             return [sum(w * v for w, v in zip(row, x, strict=False)) for row in a]
 
         def total(*factors: Sequence[float]) -> float:
-            products = list(b)
+            products = list(self.b)
             for factor in factors:
                 products = [p * f for p, f in zip(products, factor, strict=True)]
             return sum(products)

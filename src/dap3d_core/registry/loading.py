@@ -57,13 +57,13 @@ def load(
             module = importlib.import_module(source.module)
             types = types_of(module, (source.kind,))[source.kind]
             type_ = _with_keyword(source, types)
-            _loaded[source, module] = _examined(type_)
-        return _examined(type_)
+            _loaded[source, module] = examined(type_)
+        return examined(type_)
 
 
 @cache
-def _examined(type_: type[TypeBase]) -> TypeInfo:
-    """What a class says is the same in all registries of a process."""
+def examined(type_: type[TypeBase]) -> TypeInfo:
+    """The type of a class, examined once: what it says is the same in all registries."""
     return examine(type_)
 
 

@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import Any, ClassVar
 
 from dap3d_core.interface.contacts.resistance import RESISTED
+from dap3d_core.interface.element_states import add_fields
 from dap3d_core.interface.fields import FieldSpec, choice, field_of, number, slot_of
 from dap3d_core.interface.types import Joint, TypeBase
 
@@ -123,7 +124,7 @@ class Contact(Joint):
         if "kernel_names" not in vars(cls):
             cls.states = {"mode": 1, "way": 3, "near": 3}
             if of is not None:
-                _add_fields(cls, _shared_fields(cls, of))
+                add_fields(cls, _shared_fields(cls, of))
             _add_material(cls)
             if cls.load:
                 pushing = getattr(of, "unilateral", ())
@@ -200,17 +201,7 @@ def _add_material(class_: type) -> None:
         read = signature(class_.resist).parameters  # type: ignore[attr-defined]
         fields |= {name: hidden(0.0) for name, _ in RESISTED.values() if name not in read}
     fields |= {name: hidden(value) for name, value in HIDDEN.items()}
-    _add_fields(class_, fields)
-
-
-def _add_fields(class_: type, fields: Mapping[str, Any]) -> None:
-    """Give a class fields, but for those that it declares."""
-    own = dict(vars(class_).get("__annotations__", {}))
-    for name, field in fields.items():
-        if not any(name in vars(base).get("__annotations__", {}) for base in class_.__mro__):
-            setattr(class_, name, field)
-            own[name] = Any
-    class_.__annotations__ = own
+    add_fields(class_, fields)
 
 
 def _shared_fields(class_: Any, of: type[TypeBase]) -> dict[str, Any]:

@@ -116,14 +116,9 @@ def _declared_sample(
     return sized_class(type_, Shape(tuple(sizes.items()), tuple(slots.items()), constants))
 
 
-def sized(type_info: TypeInfo, shape: Shape, examine: Callable[..., TypeInfo]) -> TypeInfo:
-    """The type for one shape of its lists; examine: of examine.py, which makes use of this file."""
-    type_: Any = type_info.type
-    return _examined(type_, shape, examine)
-
-
 @cache
-def _examined(type_: Any, shape: Shape, examine: Callable[..., TypeInfo]) -> TypeInfo:
+def sized(type_: Any, shape: Shape, examine: Callable[..., TypeInfo]) -> TypeInfo:
+    """The type for one shape of its lists; examine: of examine.py, which makes use of this file."""
     return attrs.evolve(examine(sized_class(type_, shape)), given=str(shape))
 
 

@@ -5,20 +5,19 @@ of its materials, and one instance for each point. Of shapes that collide is rea
 """
 
 from collections.abc import Mapping, Sequence
-from functools import cache, partial
+from functools import partial
 from itertools import combinations, combinations_with_replacement
 from typing import Any
 
 import attrs
 import numpy as np
 
-from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.contacts.contact import HIDDEN, LAWS, MATERIAL, SMOOTH, TOUCHES
 from dap3d_core.interface.contacts.resistance import RESISTED, resisting_type
-from dap3d_core.interface.examine.examine import examine
 from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.interface.formats.frames import from_quaternion
 from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.registry.loading import examined
 from dap3d_core.scene.contacts.collision_shapes import KINDS, CollisionShapes
 from dap3d_core.scene.contacts.tables import OF_PAIRS, Collisions, Material, Materials
 from dap3d_core.scene.errors import MISSING, Key
@@ -214,15 +213,21 @@ def _material(report: Collector, material: Material) -> Material:
     key: Key = ("materials", material.name)
     given = {name: getattr(material, name) for name in LARGEST}
     found: dict[str, Any] = {n: _coefficient(report, (*key, n), x) for n, x in given.items()}
-    mu, mu_s = found["mu"] or 0.0, found["mu_s"]
-    if mu_s is not None and mu_s < mu:
-        what = f"is less than mu = {mu:g}; what slides would stick more than rest"
-        report.add((*key, "mu_s"), mu_s, what)
+    if _sticks_less(report, key, found["mu_s"], found["mu"] or 0.0):
         found["mu_s"] = None
     if material.law is not None:
         law = report.read((*key, "law"), material.law, lambda word: word_of(word, LAWS))
         found["law"] = None if isinstance(law, Fault) else law
     return Material(material.name, **found)
+
+
+def _sticks_less(report: Collector, key: Key, mu_s: float | None, mu: float) -> bool:
+    """True, and a mistake, where sticking friction is less than that of sliding."""
+    if mu_s is None or mu_s >= mu:
+        return False
+    what = f"is less than mu = {mu:g}; what slides would stick more than rest"
+    report.add((*key, "mu_s"), mu_s, what)
+    return True
 
 
 def _read_pair(report: Collector, key: Key, table: Any, pair: dict[str, float]) -> None:
@@ -250,12 +255,6 @@ def _coefficient(report: Collector, key: Key, value: Any) -> float | None:
     return None if isinstance(read, Fault) else read
 
 
-#: Stands for fields of a type that is not known.
-_ANY = FieldSpec("number", None)
-#: Coefficients that laws of a type may leave unread.
-_UNREAD = dict.fromkeys(("mu", "mu_s", "mu_roll", "mu_spin"), 0.0)
-
-
 def read_contacts(
     report: Collector, geometry: Geometry, types: Types, functions: Sequence[Instance],
     elements: Mapping[str, Element], materials: Materials,
@@ -272,7 +271,8 @@ def read_contacts(
     for one in read_elements(report, geometry, "contacts", types, functions, elements):
         count: int = one.type_info.type.points  # type: ignore[attr-defined]
         smooth = one.type_info.type.is_smooth  # type: ignore[attr-defined]
-        given = _UNREAD | one.values | (SMOOTH if smooth else {}) | HIDDEN
+        unread = dict.fromkeys(("mu", "mu_s", "mu_roll", "mu_spin"), 0.0)
+        given = unread | one.values | (SMOOTH if smooth else {}) | HIDDEN
         if given["touch"] and count > 1:
             what = f"cannot be: a {one.type_info.type.keyword} may touch at {count} points"
             remedy = "place its bodies so that they touch, or add a contact of the point that does"
@@ -282,9 +282,7 @@ def read_contacts(
             values = given | {"part": float(k)}
             if values["touch"]:
                 values["mode_0"] = TOUCHES  # its gap is a row as the scene is assembled
-            if values["mu_s"] is not None and values["mu_s"] < values["mu"]:
-                what = f"is less than mu = {values['mu']:g}; what slides would stick more than rest"
-                report.add(("contacts", one.name, "mu_s"), values["mu_s"], what)
+            _sticks_less(report, ("contacts", one.name), values["mu_s"], values["mu"])
             found.append(attrs.evolve(one, name=name, values=values))
     return [*found, *_resisting(report, found)]
 
@@ -303,7 +301,7 @@ def _resisting(report: Collector, contacts: Sequence[Instance]) -> list[Instance
                 report.add(("contacts", f"{name}_{how}"), MISSING, words, remedy="rename it")
             values = one.values | SMOOTH | {"e": 0.0, "mode_0": 0.0, "joint": one.name}
             name = f"{name}_{how}#{point}" if point else f"{name}_{how}"
-            type_info = _examined(resisting_type(type_, how))
+            type_info = examined(resisting_type(type_, how))
             found.append(attrs.evolve(one, name=name, type_info=type_info, values=values))
     return found
 
@@ -367,10 +365,8 @@ def read_friction(
     for force in forces:
         joint = joints[force.values[force.type_info.friction_joint]]
         given, key = force.values, ("forces", force.name)
-        if given.get("mu_s") is not None and given["mu_s"] < given["mu"]:
-            what = f"is less than mu = {given['mu']:g}; what slides would stick more than rest"
-            report.add((*key, "mu_s"), given["mu_s"], what)
-        grips = grips_of(joint.type_info)
+        _sticks_less(report, key, given.get("mu_s"), given["mu"])
+        grips = [examined(grip) for grip in joint.type_info.type.grips]  # type: ignore[attr-defined]
         for k, grip in enumerate(grips):
             name = force.name if len(grips) == 1 else f"{force.name}#{k + 1}"
             values = SMOOTH | joint.values | HIDDEN | {"e": 0.0, "part": float(k)}
@@ -401,17 +397,6 @@ def with_unit_mass(contacts: Sequence[Instance], mass: Floats) -> list[Instance]
     return found
 
 
-def grips_of(joint: TypeInfo) -> tuple[TypeInfo, ...]:
-    """The friction that sticks of a type of joint."""
-    type_: Any = joint.type
-    return tuple(map(_examined, type_.grips))
-
-
-@cache
-def _examined(grip: Any) -> TypeInfo:
-    return examine(grip)
-
-
 def _with_material(
     report: Collector, types: Types, element: Element, materials: Materials
 ) -> Element:
@@ -427,6 +412,7 @@ def _with_material(
         return attrs.evolve(element, fields=fields)
     known = types.known("contact", element.type)
     own = specs_of(known.type) if known else {}  # of another law of friction perhaps without mu
-    given = {field: getattr(material, field) for field in MATERIAL if own.get(field, _ANY).given}
+    taken = [field for field in MATERIAL if field not in own or own[field].given]
+    given = {field: getattr(material, field) for field in taken}
     given = {field: value for field, value in given.items() if value is not None}
     return attrs.evolve(element, fields=given | fields)

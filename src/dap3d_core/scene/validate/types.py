@@ -127,8 +127,9 @@ def completed_type(
     from dap3d_core.interface.examine.examine import examine
     from dap3d_core.interface.examine.sized_types import sized
 
+    type_: Any = type_info.type
     try:
-        return sized(type_info, shape, examine)
+        return sized(type_, shape, examine)
     except PluginError as error:
         if not isinstance(error.__cause__, ValueError):
             raise

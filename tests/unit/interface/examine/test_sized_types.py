@@ -95,9 +95,9 @@ def test_parts_are_summed_for_each_body():
 def test_a_shape_has_one_type():
     """Equal lists share a compiled loop."""
     shape = Shape((("m", 2),), (("axes", ("i", "j")),))
-    base = examine(Aligned)
-    assert sized(base, shape, examine) is sized(base, shape, examine)
-    assert sized(base, shape, examine).layout.slots == ("i", "j")
+    type_info = sized(Aligned, shape, examine)
+    assert type_info is sized(Aligned, shape, examine)
+    assert type_info.layout.slots == ("i", "j")
     assert entry_fields("axes", ("i", "j")) == ["axes_0_i", "axes_1_j"]
 
 
