@@ -3,6 +3,7 @@
 import numpy as np
 
 import dap3d_core as dap
+from support.minimal_motion import turned
 
 #: Axes of the six hinges in the pose of zero angles; each hinge is at the lower end of its link.
 AXES = np.array([[0.0, 0, 1], [0, 1, 0], [0, 1, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0]])
@@ -53,12 +54,6 @@ def torque(q, q_dot):
     return GAINS[0] * (GOAL - q) - GAINS[1] * q_dot
 
 
-def turn(axis, angle):
-    """The rotation matrix about a unit axis (Rodrigues)."""
-    K = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
-
-
 def accelerations(q, q_dot, tau):
     """q_ddot (6,) by the recursive Newton-Euler algorithm, column by column of the mass matrix.
     Craig, Introduction to Robotics, 6.5: velocities outwards, forces inwards, in ground axes. All
@@ -80,7 +75,7 @@ def _moments(q, q_dot, q_ddot, gravity):
         turning = axis * q_dot[:, k, None]
         w_dot = w_dot + axis * q_ddot[:, k, None] + cross(w, turning)
         w = w + turning
-        A = A @ turn(AXES[k], q[k])
+        A = A @ turned(AXES[k], q[k])
         s, d = A @ CENTRES[k], A @ LINKS[k]
         a_c = a + cross(w_dot, s) + cross(w, cross(w, s))
         J = A @ np.diag(INERTIA[k]) @ A.T

@@ -3,58 +3,30 @@
 import numpy as np
 
 import dap3d_core as dap
-from support.problems import ROD
+from support import mechanisms
 
 G = 9.81
-UPRIGHT = (1 / 12, 1e-3, 1 / 12)  # the same rod along y
 
 
 def four_bars(count):
     """IFToMM A02: ``count`` parallelograms in a row, every joint a spatial revolute.
     2 count + 1 rods of 1 m and 1 kg; cranks upright at the start, couplers level, vx(B0) = 1
     m/s."""
-    scene = dap.Scene(name=f"A02 of {count}")
-    for k in range(count + 1):
-        crank = f"crank{k}"
-        scene.add_body(crank, mass=1.0, Jp=UPRIGHT, r=(k, 0.5, 0.0),
-                       r_dot=(0.5, 0.0, 0.0), w=(0.0, 0.0, -1.0))  # fmt: skip
-        scene.add_point(f"low{k}", crank, (0.0, -0.5, 0.0))
-        scene.add_point(f"high{k}", crank, (0.0, 0.5, 0.0))
-        scene.add_point(f"pivot{k}", "ground", (float(k), 0.0, 0.0))
-        scene.add_joint("rev", f"A{k}", P_i=f"low{k}", P_j=f"pivot{k}",
-                        a_i=f"{crank}.z", a_j="ground.z")  # fmt: skip
-    for k in range(count):
-        coupler = f"coupler{k}"
-        scene.add_body(coupler, mass=1.0, Jp=ROD, r=(k + 0.5, 1.0, 0.0), r_dot=(1.0, 0.0, 0.0))
-        for side, end in enumerate(("left", "right")):
-            scene.add_point(f"{end}{k}", coupler, (side - 0.5, 0.0, 0.0))
-            scene.add_joint("rev", f"{end}_B{k}", P_i=f"{end}{k}", P_j=f"high{k + side}",
-                            a_i=f"{coupler}.z", a_j=f"crank{k + side}.z")  # fmt: skip
+    scene = mechanisms.four_bar_row(count)
+    for name, rod in scene.bodies.items():
+        is_crank = name.startswith("crank")
+        rod.r_dot = (0.5 if is_crank else 1.0, 0.0, 0.0)
+        rod.w = (0.0, 0.0, -1.0 if is_crank else 0.0)
     scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
     return scene
 
 
 def bricard():
     """IFToMM A04: five rods on six revolutes, one freedom, 30 rows of which 29 are independent."""
-    corners = np.array(
-        [(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0, 0, 1)], dtype=float
-    )
-    axes = "yzxyzx"
-    scene = dap.Scene(name="A04")
-    for k in range(5):
-        along = corners[k + 1] - corners[k]
-        middle = 0.5 * (corners[k] + corners[k + 1])
-        Jp = np.where(np.abs(along) > 0.5, 1 / 600, 0.25 / 3 + 0.01 / 12)
-        scene.add_body(f"rod{k}", mass=1.0, Jp=tuple(Jp), r=tuple(middle))
-        scene.add_point(f"tail{k}", f"rod{k}", tuple(-0.5 * along))
-        scene.add_point(f"head{k}", f"rod{k}", tuple(0.5 * along))
-    scene.add_point("last", "ground", tuple(corners[5]))
-    for k, axis in enumerate(axes):
-        P_i = f"tail{k}" if k < 5 else "head4"
-        P_j = "ground.O" if k == 0 else f"head{k - 1}" if k < 5 else "last"
-        i = f"rod{min(k, 4)}"
-        j = "ground" if k in (0, 5) else f"rod{k - 1}"
-        scene.add_joint("rev", f"J{k}", P_i=P_i, P_j=P_j, a_i=f"{i}.{axis}", a_j=f"{j}.{axis}")
+    scene = mechanisms.bricard()
+    for k, rod in enumerate(scene.bodies.values()):
+        along = np.abs(scene.points[f"end{k}"].sPp) > 0.25
+        rod.Jp = tuple(np.where(along, 1 / 600, 0.25 / 3 + 0.01 / 12))
     scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
     return scene
 
@@ -142,34 +114,7 @@ def driven_four_bar():
     return scene
 
 
-def dead_centre():
-    """A slider-crank of 1 m and 2 m, driven by its slider: x = 3 - (1 - t)^2 / 2.
-    At its dead centre, t = 1 s, the crank may swing to either side and the rod about its axis."""
-    angle, other = (float(v) for v in dead_centre_angles(np.zeros(1))[:, 0])
-    scene = dap.Scene(name="dead centre")
-    for name, length, mass_moment, turn, first in (
-        ("crank", 1.0, 1 / 12, angle, (0.0, 0.0)),
-        ("rod", 2.0, 1 / 3, -other, (np.cos(angle), np.sin(angle))),
-    ):
-        along = 0.5 * length * np.array([np.cos(turn), np.sin(turn)])
-        scene.add_body(name, mass=1.0, Jp=(1e-3, mass_moment, mass_moment),
-                       r=(*(np.array(first) + along), 0.0),
-                       p=(np.cos(0.5 * turn), 0.0, 0.0, np.sin(0.5 * turn)))  # fmt: skip
-        scene.add_point(f"{name}_start", name, (-0.5 * length, 0.0, 0.0))
-        scene.add_point(f"{name}_end", name, (0.5 * length, 0.0, 0.0))
-    scene.add_body("slider", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(2.5, 0.0, 0.0), r_dot=(1.0, 0.0, 0.0))
-    scene.add_joint("rev", "A", P_i="crank_start", P_j="ground.O", a_i="crank.z", a_j="ground.z")
-    scene.add_joint("sph", "B", P_i="rod_start", P_j="crank_end")
-    scene.add_joint("univ", "C", P_i="rod_end", P_j="slider.O", a_i="rod.z", n_j="slider.x")
-    scene.add_joint("tran", "S", P_i="slider.O", P_j="ground.O", a_j="ground.x")
-    scene.add_function("a", "push", coeff=(0.0, 1.0, -0.5))
-    scene.add_joint("drive-tran", "drive", P_i="slider.O", P_j="ground.O", a_j="ground.x",
-                    function="push")  # fmt: skip
-    return scene
-
-
-def dead_centre_angles(t):
-    """(2, nt) angles of crank and rod to the line of the slider: the crank goes through."""
+def dead_centre_angle(t):
+    """Angle of the crank of ``singular.dead_centre``, which goes through."""
     x = 3.0 - 0.5 * (1.0 - t) ** 2
-    angle = np.sign(1.0 - t) * np.arccos(np.clip((x**2 - 3.0) / (2.0 * x), -1.0, 1.0))
-    return np.array([angle, np.arcsin(0.5 * np.sin(angle))])
+    return np.sign(1.0 - t) * np.arccos(np.clip((x**2 - 3.0) / (2.0 * x), -1.0, 1.0))

@@ -1,18 +1,15 @@
 """Eigenvalues of the Whipple bicycle against the benchmark of Meijaard and others, to 12 digits.
 J. P. Meijaard, J. M. Papadopoulos, A. Ruina, A. L. Schwab: Linearized dynamics equations for the
 balance and steer of a bicycle: a benchmark and review, Proc. R. Soc. A 463 (2007) 1955-1982. The
-bicycle is built from its table 1; the expected eigenvalues are those of the matrices that the paper
-prints, M q'' + v C1 q' + (g K0 + v^2 K2) q = 0, and at v = 0 and 5 m/s those of its table 2."""
+bicycle is built from its table 1; the expected eigenvalues are those of its linear equations, and
+at v = 0 and 5 m/s those of its table 2."""
 
 import numpy as np
 import pytest
+from support.whipple import system
 
 import dap3d_core as dap
 
-M = np.array([[80.81722, 2.31941332208709], [2.31941332208709, 0.29784188199686]])
-K0 = np.array([[-80.95, -2.59951685249872], [-2.59951685249872, -0.80329488458618]])
-K2 = np.array([[0.0, 76.59734589573222], [0.0, 2.65431523794604]])
-C1 = np.array([[0.0, 33.86641391492494], [-0.85035641456978, 1.68540397397560]])
 PRINTED = {
     0.0: [-5.530943717653930, -3.131643247906560, 3.131643247906560, 5.530943717653930],
     5.0: [-14.0783896927982, -0.322866429004087,
@@ -54,16 +51,13 @@ def bicycle(speed):
 def test_eigenvalues(speed):
     """Weave, capsize and castering at every speed; all other eigenvalues are exactly zero.
     They are the place (x, y), heading, both wheels' angles, and the speed."""
-    K, C = 9.81 * K0 + speed**2 * K2, speed * C1
-    inverse = np.linalg.inv(M)
-    matrix = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ K, -inverse @ C]])
-    expected = np.linalg.eigvals(matrix)
+    expected = np.linalg.eigvals(system(speed))
     lin = dap.linearize(bicycle(speed))
     assert np.sum(lin.eigenvalues == 0.0) == 6
     own = lin.eigenvalues[6:]
     for value in (*expected, *PRINTED.get(speed, ())):
         nearest = own[np.argmin(np.abs(own - value))]
-        # 12 digits of the printed matrices; the capsize eigenvalue near its zero at 6.02 m/s is
+        # 12 digits of the printed numbers; the capsize eigenvalue near its zero at 6.02 m/s is
         # the small difference of large terms
         assert abs(nearest - value) <= 1e-12 * max(abs(value), 1.0)
     assert lin.is_steady

@@ -99,13 +99,19 @@ def test_a_winch_with_a_function_and_an_input():
         )
 
 
-def belt(crossed, by_joints=False):
+def pulleys_at(places, inertias):
+    """Pulleys a, b, ... on hinges of ground, by their moments about z."""
     scene = dap.Scene(name="belt")
-    for name, x, J in (("a", 0.0, 0.02), ("b", 1.0, 0.05)):
-        scene.add_body(name, mass=1.0, Jp=[0.1, 0.1, J], r=[x, 0.0, 0.0])
-        scene.add_point(f"{name}_pin", body="ground", sPp=[x, 0.0, 0.0])
+    for name, (x, y), J in zip("abcd", places, inertias, strict=False):
+        scene.add_body(name, mass=1.0, Jp=[0.1, 0.1, J], r=[x, y, 0.0])
+        scene.add_point(f"{name}_pin", body="ground", sPp=[x, y, 0.0])
         pins = {"P_i": f"{name}.O", "P_j": f"{name}_pin"}
         scene.add_joint("rev", f"{name}_axis", **pins, a_i=f"{name}.z", a_j="ground.z")
+    return scene
+
+
+def belt(crossed, by_joints=False):
+    scene = pulleys_at([(0.0, 0.0), (1.0, 0.0)], [0.02, 0.05])
     pulleys = {"points": ["a.O", "b.O"], "radii": [0.1, 0.25], "axis_i": "ground.z"}
     if by_joints:
         pulleys = {"joints": ["a_axis", "b_axis"], "radii": [0.1, 0.25]}
@@ -148,13 +154,8 @@ RIGID = {
 
 def rigid_belt(places, radii, fields, moment):
     """Pulleys on hinges of ground, the last one driven by a moment."""
-    scene = dap.Scene(name="belt")
-    names = "abcd"[: len(places)]
-    for name, (x, y), rho in zip(names, places, radii, strict=True):
-        scene.add_body(name, mass=1.0, Jp=[0.1, 0.1, 2.0 * rho * rho], r=[x, y, 0.0])
-        scene.add_point(f"{name}_pin", body="ground", sPp=[x, y, 0.0])
-        pins = {"P_i": f"{name}.O", "P_j": f"{name}_pin"}
-        scene.add_joint("rev", f"{name}_axis", **pins, a_i=f"{name}.z", a_j="ground.z")
+    scene = pulleys_at(places, [2.0 * rho * rho for rho in radii])
+    names = list(scene.bodies)
     scene.add_joint("belt", "belt", joints=[f"{n}_axis" for n in names], radii=radii, **fields)
     scene.add_force("np", "drive", body_i=names[-1], np=[0.0, 0.0, moment])
     return scene

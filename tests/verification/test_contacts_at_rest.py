@@ -2,38 +2,24 @@
 
 import numpy as np
 import pytest
+from verification.test_contacts import ANGLE, G, slope
 
 import dap3d_core as dap
 
-G = 9.81
-
-
-def block(mu, angle=0.4):
-    """A block on four corners, on a slope."""
-    c, s, h = np.cos(angle), np.sin(angle), 0.05
-    scene = dap.Scene(name="slope")
-    scene.add_vector("n", "ground", [-s, 0.0, c])
-    p = [np.cos(angle / 2.0), 0.0, -np.sin(angle / 2.0), 0.0]
-    scene.add_body("box", mass=1.0, Jp=[0.002, 0.003, 0.004], r=[-s * h, 0.0, c * h], p=p)
-    scene.add_force("weight", "g")
-    size = [0.3, 0.2, 2.0 * h]
-    scene.add_contact("box_plane", "floor", P_i="box.O", size=size, a_j="n", mu=mu)
-    return scene
-
 
 def test_a_block_rests_on_a_slope_within_its_cone():
-    found = dap.equilibrium(block(np.tan(0.4) / 0.999))
+    found = dap.equilibrium(slope(0.999))
     normals = found.Lam[::3]
-    assert normals.sum() == pytest.approx(G * np.cos(0.4), rel=1e-12)
+    assert normals.sum() == pytest.approx(G * np.cos(ANGLE), rel=1e-12)
     assert found.stable
     assert found.residual < 1e-12
-    run = dap.simulate(block(np.tan(0.4) / 0.999), start=found, t_end=1.0, dt=0.5)
+    run = dap.simulate(slope(0.999), start=found, t_end=1.0, dt=0.5)
     assert np.max(np.abs(run.r - run.r[0])) < 1e-14
 
 
 def test_a_block_beyond_its_cone_slips_by_name():
     with pytest.raises(dap.SimulationError, match=r"floor#1.*slips"):
-        dap.equilibrium(block(np.tan(0.4) / 1.001))
+        dap.equilibrium(slope(1.001))
 
 
 def ladder(angle, mu):

@@ -1,5 +1,7 @@
 """Derivatives of runs against closed forms, to 1e-9 of the largest at rtol 1e-12."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy.special import airy, ellipj, ellipk
@@ -26,6 +28,13 @@ def derivative(function, x, h=1e-3):
     return sum(w * (function(x + k * h) - function(x - k * h)) for k, w in pairs) / (60.0 * h)
 
 
+def by_each(function, values):
+    """The derivatives of a closed form by each of its arguments, in turn."""
+    for j, value in enumerate(values):
+        yield derivative(lambda x, j=j: function(*np.where(np.arange(len(values)) == j, x, values)),
+                         value)  # fmt: skip
+
+
 def oscillator():
     scene = dap.Scene(name="oscillator")
     scene.add_body("mass", mass=2.0, Jp=(1.0, 1.0, 1.0), r=(1.5, 0.0, 0.0), r_dot=(0.2, 0.0, 0.0))
@@ -44,7 +53,7 @@ def oscillation(t, m, k, c, l0, x0, v0):
 def test_an_oscillator(integrator):
     by = ["bodies.mass.mass", "forces.spring.k", "forces.spring.c", "forces.spring.l0",
           "bodies.mass.r.x", "bodies.mass.r_dot.x"]  # fmt: skip
-    values = np.array([2.0, 40.0, 0.8, 1.0, 1.5, 0.2])
+    values = (2.0, 40.0, 0.8, 1.0, 1.5, 0.2)
     # dopri5 and adams err by some 1e-10 themselves at this tolerance
     part = 1e-9 if integrator == "dop853" else 1e-8
     s = dap.sensitivities(oscillator(), by, t_end=2.0, dt=0.1, integrator=integrator, **TIGHT)
@@ -52,11 +61,7 @@ def test_an_oscillator(integrator):
     assert plain.u.tobytes() == s.result.u.tobytes()
     assert plain.v_dot.tobytes() == s.result.v_dot.tobytes()
     assert plain.stats.steps == s.result.stats.steps
-    for j in range(len(by)):
-        expected = derivative(
-            lambda x, j=j: oscillation(s.result.t, *np.where(np.arange(6) == j, x, values)),
-            values[j],
-        )
+    for j, expected in enumerate(by_each(partial(oscillation, s.result.t), values)):
         close(s.of("mass.r.x")[:, j], expected, part)
     np.testing.assert_array_equal(s.final("mass.r.x"), s.of("mass.r.x")[-1])
     assert s.names == tuple(by)
@@ -83,16 +88,23 @@ def test_by_a_point_in_a_list(keyword):
     assert next(iter(swept.data_vars.values())).values == pytest.approx(expected, abs=1e-9)
 
 
+def rail(direction):
+    """A body that falls down a rail."""
+    scene = dap.Scene(name="rail")
+    scene.add_body("block", mass=2.0, Jp=(1.0, 1.0, 1.0))
+    scene.add_vector("rail", "ground", direction)
+    scene.add_joint("tran", "guide", P_i="block.O", P_j="ground.O", a_j="rail")
+    scene.add_force("weight", "gravity", gravity=9.81)
+    return scene
+
+
 @pytest.mark.parametrize("aside", ["x", "y"])
 def test_by_the_direction_of_an_axis_along_another(aside):
     """A body falls down a rail along z: -a (a . g) t^2 / 2 along its axis a, by what tilts it. The
     normals that complete an axis jumped where two components of it are equal, as zeros are."""
-    scene = dap.Scene(name="rail")
-    scene.add_body("block", mass=2.0, Jp=(1.0, 1.0, 1.0))
-    scene.add_vector("rail", "ground", (0.0, 0.0, 1.0))
-    scene.add_joint("tran", "guide", P_i="block.O", P_j="ground.O", a_j="rail")
-    scene.add_force("weight", "gravity", gravity=9.81)
-    s = dap.sensitivities(scene, [f"vectors.rail.sp.{aside}"], t_end=1.0, dt=0.1, **TIGHT)
+    s = dap.sensitivities(
+        rail((0.0, 0.0, 1.0)), [f"vectors.rail.sp.{aside}"], t_end=1.0, dt=0.1, **TIGHT
+    )
     fallen = -0.5 * 9.81 * s.result.t**2
     expected = np.zeros((len(fallen), 3))
     expected[:, "xyz".index(aside)] = fallen
@@ -104,12 +116,9 @@ def test_by_the_direction_of_an_axis_whose_normals_jump():
     """Where one component of an axis is above the least by a fiftieth, its normals are others on
     either side: the derivative is taken on one."""
     sp = np.array([0.32, np.sqrt(1.0 - 0.32**2 - 0.3**2), 0.3])
-    scene = dap.Scene(name="rail")
-    scene.add_body("block", mass=2.0, Jp=(1.0, 1.0, 1.0))
-    scene.add_vector("rail", "ground", tuple(sp.tolist()))
-    scene.add_joint("tran", "guide", P_i="block.O", P_j="ground.O", a_j="rail")
-    scene.add_force("weight", "gravity", gravity=9.81)
-    s = dap.sensitivities(scene, ["vectors.rail.sp.x"], t_end=1.0, dt=0.1, **TIGHT)
+    s = dap.sensitivities(
+        rail(tuple(sp.tolist())), ["vectors.rail.sp.x"], t_end=1.0, dt=0.1, **TIGHT
+    )
 
     def place(x):
         a = np.array([x, sp[1], sp[2]])
@@ -207,11 +216,7 @@ def test_a_free_symmetric_top():
         angle = (C - 2.0) / 2.0 * spin * t
         return across * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
-    values = np.array([3.0, 4.0, 0.5])
-    for j in range(3):
-        expected = derivative(
-            lambda x, j=j: precession(*np.where(np.arange(3) == j, x, values)), values[j]
-        )
+    for j, expected in enumerate(by_each(precession, (3.0, 4.0, 0.5))):
         close(found[..., j], expected)
 
 
@@ -242,22 +247,16 @@ def test_a_bouncing_ball():
     assert plain.u.tobytes() == s.result.u.tobytes()
     t = s.result.t
 
-    def bounce(g, z0, v0):
+    def bounce(e, g, z0, v0):
         return (v0 + np.sqrt(v0 * v0 + 2.0 * g * z0)) / g
 
     def height(e, g, z0, v0):
-        first, speed = bounce(g, z0, v0), np.sqrt(v0 * v0 + 2.0 * g * z0)
+        first, speed = bounce(e, g, z0, v0), np.sqrt(v0 * v0 + 2.0 * g * z0)
         after = e * speed * (t - first) - 0.5 * g * (t - first) ** 2
         return np.where(t < t_bounce, z0 + v0 * t - 0.5 * g * t * t, after)
 
-    values = np.array([0.8, 9.81, 1.0, 1.5])
-    t_bounce = bounce(*values[1:])
-    for j in range(4):
-        expected = derivative(
-            lambda x, j=j: height(*np.where(np.arange(4) == j, x, values)), values[j]
-        )
+    values = (0.8, 9.81, 1.0, 1.5)
+    t_bounce = bounce(*values)
+    for j, expected in enumerate(by_each(height, values)):
         close(s.of("ball.r.z")[:, j], expected)
-        of_time = derivative(
-            lambda x, j=j: bounce(*np.where(np.arange(4) == j, x, values)[1:]), values[j]
-        )
-        assert s.event_times[0, j] == pytest.approx(of_time, rel=1e-9, abs=1e-12)
+    assert s.event_times[0] == pytest.approx(list(by_each(bounce, values)), rel=1e-9, abs=1e-12)

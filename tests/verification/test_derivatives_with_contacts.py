@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from verification.test_contacts import TIGHT, G, ball
 from verification.test_derivatives_of_runs import derivative
+from verification.test_sticking_under_load import wheel
 
 import dap3d_core as dap
 
@@ -175,16 +176,10 @@ def test_a_rod_that_bounces_and_turns(place, t_end, tolerance):
 @pytest.mark.slow
 def test_a_wheel_that_its_loaded_pin_stops_by_friction_and_radius():
     """It turns by I w^2 / (2 mu R m g), and stops at I w / (mu R m g)."""
-    mu, radius, inertia, w = 0.3, 0.02, 0.1, 2.0
-    scene = dap.Scene(name="wheel")
-    scene.add_body("wheel", mass=5.0, Jp=[inertia] * 3, w=(0.0, w, 0.0))
-    axis = {"P_i": "wheel.O", "P_j": "ground.O", "a_i": "wheel.y", "a_j": "ground.y"}
-    scene.add_joint("rev", "pin", **axis)
-    scene.add_force("weight")
-    scene.add_force("friction", "rub", joint="pin", mu=mu, radius=radius)
+    mu, radius, w = 0.3, 0.02, 2.0
+    scene, moment, inertia = wheel(w, mu, radius)
     by = ["forces.rub.mu", "forces.rub.radius"]
     found = dap.sensitivities(scene, by, t_end=2.0, dt=0.5, **TIGHT)
-    moment = mu * radius * 5.0 * G
     far, stops = 0.5 * inertia * w**2 / moment, inertia * w / moment
     assert found.final("pin.angle") == pytest.approx([-far / mu, -far / radius], rel=TOLERANCE)
     assert found.event_times[0] == pytest.approx([-stops / mu, -stops / radius], rel=TOLERANCE)

@@ -4,23 +4,11 @@ leaves some 1e-9."""
 
 import numpy as np
 import pytest
+from verification.test_torsion import wheel
 
 import dap3d_core as dap
 
 TIGHT = {"rtol": 1e-11, "atol": 1e-13}
-
-
-def turned(angle):
-    """Euler parameters of a turn about z."""
-    return np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)
-
-
-def wheel(angle=0.3):
-    """A wheel on an axle along z, turned by an angle."""
-    scene = dap.Scene(name="wheel")
-    scene.add_body("wheel", mass=2.0, Jp=(0.2, 0.2, 0.3), p=turned(angle))
-    scene.add_joint("rev", "axle", P_i="wheel.O", P_j="ground.O", a_i="wheel.z", a_j="ground.z")
-    return scene
 
 
 def heading(result, body=0):
@@ -31,7 +19,7 @@ def heading(result, body=0):
 
 def test_a_driven_wheel_has_the_angle_of_its_function():
     """drive-rot: the angle since the start is f - f(0) for body i, ground j, over many turns."""
-    scene = wheel()
+    scene = wheel(0.3)
     scene.add_function("a", "motor", coeff=(1.7, 9.0, 0.5))
     scene.add_joint("drive-rot", "drive", body_i="wheel", a_j="ground.z", function="motor")
     result = dap.simulate(scene, t_end=5.0, dt=0.1, **TIGHT)
@@ -60,7 +48,8 @@ def test_a_driven_angle_does_not_drift():
 def test_a_driven_angle_is_pulled_back_by_the_correction():
     """drive-rot between two bodies: what a loop moves at the start, the driver's row restores."""
     scene = wheel(0.0)
-    scene.add_body("crank", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 1e-3), p=turned(0.5))
+    scene.add_body("crank", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 1e-3),
+                   p=(np.cos(0.25), 0.0, 0.0, np.sin(0.25)))  # fmt: skip
     scene.add_joint("rev", "pin", P_i="crank.O", P_j="wheel.O", a_i="crank.z", a_j="wheel.z")
     scene.add_joint("drive-rot", "lock", body_i="crank", body_j="wheel", a_j="wheel.z")
     scene.add_function("a", "motor", coeff=(0.0, 2.0, 0.0))
@@ -72,7 +61,7 @@ def test_a_driven_angle_is_pulled_back_by_the_correction():
 
 def test_a_lock_carries_the_moment():
     """drive-rot without a function: the wheel stands still, the reaction meets the moment."""
-    scene = wheel()
+    scene = wheel(0.3)
     scene.add_joint("drive-rot", "lock", body_i="wheel", a_j="ground.z")
     scene.add_force("n", "twist", body_i="wheel", n=(0.0, 0.0, 0.7))
     result = dap.simulate(scene, t_end=1.0, dt=0.5, **TIGHT)

@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from support import problems
 from support.internals import split
+from verification.test_reference_problems import A01, G1
 
 import dap3d_core as dap
 from dap3d_core.result.post.global_error import difference
@@ -103,13 +104,8 @@ def test_the_true_error_is_within_ten_times_the_estimate(name, setting):
     assert told >= 1 or (name, setting) in ROUNDED
 
 
-DIGITS = [
-    # benchmarks.md 1, A01: x, y at t = 10, by elliptic functions
-    ("A01", "r", (-0.27508746257611686, -0.96141920509912506)),
-    # benchmarks.md 2, G1: Euler parameters at t = 10
-    ("G1", "p", (0.83115221222978652, 0.23085437425632904, 0.50373164735113231,
-                 0.046332336970685525)),
-]  # fmt: skip
+#: x and y of A01, and Euler parameters of G1, at t = 10.
+DIGITS = [("A01", "r", A01[10.0][:2]), ("G1", "p", G1[10.0][1])]
 
 
 @pytest.mark.parametrize("setting", SETTINGS)
@@ -165,13 +161,9 @@ def test_the_reference_of_the_pendulum_is_that_of_elliptic_functions():
     """A01 (benchmarks.md 1) at t = 1 and 10; two periods a second long amplify 1e-13 by 1e3."""
     found = dap.report(problems.pendulum(), quick=True, t_end=10.0, dt=1.0, methods=["standard"])
     reference = found.reference
-    digits = {
-        1.0: (0.98629175113187532, -0.16501085312554117),
-        10.0: (-0.27508746257611686, -0.96141920509912506),
-    }
-    for t, xy in digits.items():
+    for t, digits in A01.items():
         k = int(np.argmin(np.abs(reference.t - t)))
-        assert reference.u[k, :2] == pytest.approx(xy, abs=1e-10)
+        assert reference.u[k, :2] == pytest.approx(digits[:2], abs=1e-10)
     assert reference.uncertainty < 1e-8
 
 

@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from support.contact import contact_registry
 from support.internals import LOGGED, integration_options
+from verification.test_disk import ACROSS, MASS, RADIUS, disk
 
 import dap3d_core as dap
 from dap3d_core.integrators import INTEGRATORS, Status
@@ -214,25 +215,17 @@ def test_the_first_crossings_are_kept(registry):
 def test_a_disk_that_lies_down(integrator, tolerance):
     """On smooth ground the centre falls straight; theta is the angle to the ground.
     (J + m R^2 c^2) theta'' = m R^2 s c theta'^2 - m g R c, integrated by scipy."""
-    mass, radius, across, lean = 2.0, 0.5, 0.2, 0.8
-    scene = dap.Scene(name="disk")
-    # the body's y axis is turned to (sin lean, 0, cos lean)
-    s, c = np.sin(lean), np.cos(lean)
-    turn = np.array([[0, s, -c], [-1, 0, 0], [0, c, s]])
-    q0 = np.sqrt(1.0 + np.trace(turn)) / 2.0
-    e = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-    scene.add_body("coin", mass=mass, Jp=(across, 0.3, across), r=(0.0, 0.0, radius * s),
-                   p=(q0, *(e / (4.0 * q0))))  # fmt: skip
-    scene.add_joint("disk", "contact", body_i="coin", slip="z", radius=radius)
-    scene.add_force("weight", "gravity", gravity=G)
+    lean = 0.8
     with pytest.raises(dap.SimulationError, match="the disk lies down") as caught:
-        dap.simulate(scene, t_end=2.0, dt=0.02, integrator=integrator, rtol=1e-11, atol=1e-13)
+        dap.simulate(
+            disk("z", lean=lean), t_end=2.0, dt=0.02, integrator=integrator, rtol=1e-11, atol=1e-13
+        )
     result = caught.value.result
 
     def falling(_, x):
         s, c = np.sin(x[0]), np.cos(x[0])
-        torque = mass * radius**2 * s * c * x[1] ** 2 - mass * G * radius * c
-        return [x[1], torque / (across + mass * radius**2 * c * c)]
+        torque = MASS * RADIUS**2 * s * c * x[1] ** 2 - MASS * G * RADIUS * c
+        return [x[1], torque / (ACROSS + MASS * RADIUS**2 * c * c)]
 
     def lies(_, x):
         return np.sin(x[0]) - 0.02

@@ -3,24 +3,18 @@ Tolerances: rtol 1e-11 over some seconds leaves some 1e-9 of the largest coordin
 
 import numpy as np
 import pytest
+from verification.test_sticking_friction import hinge
 
 import dap3d_core as dap
 
 TIGHT = {"rtol": 1e-11, "atol": 1e-13}
 
 
-def hinge(inertia, spin):
-    scene = dap.Scene(name="hinge")
-    scene.add_body("wheel", mass=2.0, Jp=(0.5, 0.5, inertia), w=(0.0, 0.0, spin))
-    scene.add_joint("rev", "axle", P_i="wheel.O", P_j="ground.O", a_i="wheel.z", a_j="ground.z")
-    return scene
-
-
 @pytest.mark.parametrize("integrator", ["dop853", "radau"])
 def test_a_hinge_runs_down_by_its_friction(integrator):
     """I w' = -n tanh(w / w_tol): sinh(w / w_tol) falls as exp(-n t / (I w_tol))."""
     inertia, spin, n, w_tol = 0.3, 2.0, 0.4, 0.5
-    scene = hinge(inertia, spin)
+    scene = hinge(spin)
     scene.add_force("rot_friction", "rub", body_i="wheel", body_j="ground", axis="ground.z", n_c=n,
                     w_tol=w_tol)  # fmt: skip
     result = dap.simulate(scene, t_end=3.0, dt=0.1, integrator=integrator, **TIGHT)
@@ -35,7 +29,7 @@ def test_a_hinge_runs_down_by_its_friction(integrator):
 def test_a_hinge_stops_after_the_angle_of_constant_friction():
     """At t = I w / n, after I w^2 / (2 n), and pi^2 / 12 I w_tol^2 / n of creep more."""
     inertia, spin, n, w_tol = 0.3, 2.0, 0.4, 1e-3
-    scene = hinge(inertia, spin)
+    scene = hinge(spin)
     scene.add_force("rot_friction", "rub", body_i="wheel", body_j="ground", axis="wheel.z", n_c=n,
                     w_tol=w_tol)  # fmt: skip
     result = dap.simulate(scene, t_end=3.0, dt=0.25, integrator="radau", **TIGHT)
@@ -126,7 +120,7 @@ def test_a_ball_spring_swings_about_any_axis(c):
 def test_a_torsional_spring_in_a_hinge_by_name(turns):
     """About theta_0, which is the opposite of the hinge's angle, from a pose turned by 40 deg."""
     inertia, k, theta_0 = 0.3, 7.0, -5.0 if turns else -0.5
-    scene = hinge(inertia, 0.0)
+    scene = hinge(0.0)
     scene.bodies["wheel"].rpy = (0.0, 0.0, "40 deg")
     scene.add_force("rot_sda", "spring", joint="axle", k=k, theta_0=theta_0, turns=turns)
     result = dap.simulate(scene, t_end=1.0, dt=0.1, **TIGHT)
@@ -137,7 +131,7 @@ def test_a_torsional_spring_in_a_hinge_by_name(turns):
 
 def test_a_hinge_is_stopped_and_rubs_by_name():
     """Free to theta = -1, where it rebounds by e: half the speed on the way back."""
-    scene = hinge(0.3, 2.0)
+    scene = hinge(2.0)
     scene.add_force("rot_stop", "stop", joint="axle", theta_stop=-1.0, k=1e4, e=0.5)
     result = dap.simulate(scene, t_end=1.0, dt=0.25, **TIGHT)
     np.testing.assert_allclose(result.quantity("axle.angle").values, [0.0, 0.5, 1.0, 0.75, 0.5],
@@ -151,7 +145,7 @@ def test_a_hinge_is_stopped_and_rubs_by_name():
 @pytest.mark.parametrize("fields", [{"joint": "axle", "v_i": "wheel.x"}, {"v_i": "wheel.x", "v_j":
                                                                          "ground.x"}])  # fmt: skip
 def test_half_of_what_an_angle_is_measured_by_is_refused(fields):
-    scene = hinge(0.3, 2.0)
+    scene = hinge(2.0)
     scene.add_force("rot_sda", "spring", k=1.0, **fields)
     with pytest.raises(dap.SceneError, match=r"give joint, or v_i and v_j|axis: is required"):
         dap.compile(scene)
@@ -160,7 +154,7 @@ def test_half_of_what_an_angle_is_measured_by_is_refused(fields):
 @pytest.mark.parametrize("theta_0", [0.0, "90 deg"])
 def test_a_force_over_the_angle_of_a_hinge(theta_0):
     """Of a wheel that turns evenly, over several turns: m x.. = k (w t + theta_0)."""
-    scene, k, spin, m = hinge(0.3, 20.0), 0.7, 20.0, 3.0
+    scene, k, spin, m = hinge(20.0), 0.7, 20.0, 3.0
     scene.add_body("block", mass=m, Jp=(0.1, 0.1, 0.1), r=(1.0, 0.0, 0.0))
     scene.add_joint("tran", "slide", P_i="block.O", P_j="ground.O", a_j="ground.x")
     scene.add_function("a", "gas", coeff=(0.0, k, 0.0))

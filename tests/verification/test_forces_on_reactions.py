@@ -43,16 +43,26 @@ def test_a_brake_pressed_by_another_joint(method, integrator):
     assert result.ledger["energy"].ok
 
 
-def test_a_tyre_loaded_by_its_contact():
-    """A locked slide of a wheel: forward and spin velocities meet at the rate of the load's slip.
-    With N = m g, u = v - R w decays as exp(-k N (1 / m + R^2 / J) t), by the change of momentum."""
-    m, J, R, k = 20.0, 0.9, 0.3, 0.05
+#: Mass, moment of inertia about the axle, radius, and force per load and sliding velocity.
+TYRE = 20.0, 0.9, 0.3, 0.05
+
+
+def tyre(spin=0.0):
+    """A wheel on the ground z = 0."""
+    m, J, R, k = TYRE
     scene = dap.Scene(name="tyre")
-    scene.add_body("wheel", mass=m, Jp=(0.5, J, 0.5), r=(0, 0, R), w=(0.0, 10.0, 0.0))
+    scene.add_body("wheel", mass=m, Jp=(0.5, J, 0.5), r=(0, 0, R), w=(0.0, spin, 0.0))
     scene.add_joint("rP", "contact", body_i="wheel", a_j="ground.z", length=R)
     scene.add_force("weight")
     scene.add_force("loaded-tyre", P_i="wheel.O", contact="contact", radius=R, stiffness=k)
-    result = dap.simulate(compiled(scene), **SETTINGS)
+    return scene
+
+
+def test_a_tyre_loaded_by_its_contact():
+    """A locked slide of a wheel: forward and spin velocities meet at the rate of the load's slip.
+    With N = m g, u = v - R w decays as exp(-k N (1 / m + R^2 / J) t), by the change of momentum."""
+    m, J, R, k = TYRE
+    result = dap.simulate(compiled(tyre(10.0)), **SETTINGS)
     rate = k * m * G * (1 / m + R**2 / J)
     slip = -R * 10.0 * np.exp(-rate * result.t)
     force = -k * m * G * slip
@@ -184,12 +194,7 @@ def test_inverse_dynamics_finds_what_a_brake_takes_from_its_own_load():
 
 def test_a_linearised_tyre_has_the_rate_of_its_slip():
     """The eigenvalues of slip, along and across, are -k N (1 / m + R^2 / J)."""
-    m, J, R, k = 20.0, 0.9, 0.3, 0.05
-    scene = dap.Scene(name="tyre")
-    scene.add_body("wheel", mass=m, Jp=(0.5, J, 0.5), r=(0, 0, R))
-    scene.add_joint("rP", "contact", body_i="wheel", a_j="ground.z", length=R)
-    scene.add_force("weight")
-    scene.add_force("loaded-tyre", P_i="wheel.O", contact="contact", radius=R, stiffness=k)
-    modes = np.sort(dap.linearize(compiled(scene)).eigenvalues.real)
+    m, J, R, k = TYRE
+    modes = np.sort(dap.linearize(compiled(tyre())).eigenvalues.real)
     wanted = [-k * m * G * (1 / m + R**2 / inertia) for inertia in (0.5, J)]
     assert modes[:2] == pytest.approx(wanted, rel=1e-9)

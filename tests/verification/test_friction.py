@@ -6,6 +6,7 @@ from inspect import signature
 
 import numpy as np
 import pytest
+from verification.test_sticking_under_load import incline, leaning_disk, wheel
 
 import dap3d_core as dap
 from dap3d_joints.coulomb import fading
@@ -15,22 +16,11 @@ SLOPE = np.radians(30.0)
 METHODS = ["standard", "lsq"]
 
 
-def incline(mu, v_tol=1e-3):
-    """A block on a straight guide that falls at 30 degrees, from rest."""
-    scene = dap.Scene(name="incline")
-    scene.add_body("block", mass=2.0, Jp=(0.1, 0.2, 0.3))
-    scene.add_vector("down", "ground", (np.cos(SLOPE), 0.0, -np.sin(SLOPE)))
-    scene.add_joint("tran", "guide", P_i="block.O", P_j="ground.O", a_j="down")
-    scene.add_force("weight", "gravity")
-    scene.add_force("friction", "rub", joint="guide", mu=mu, v_tol=v_tol)
-    return scene
-
-
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("mu", [0.0, 0.2, 0.5])
 def test_a_block_slides_down_an_incline(method, mu):
     """a = g (sin - mu cos), 3.205858158 m/s^2 for mu 0.2, once tanh(v / v_tol) = 1."""
-    result = dap.simulate(incline(mu), t_end=1.0, dt=0.5, method=method)
+    result = dap.simulate(incline(SLOPE, mu, v_tol=1e-3), t_end=1.0, dt=0.5, method=method)
     wanted = G * (np.sin(SLOPE) - mu * np.cos(SLOPE))
     assert np.linalg.norm(result.rdd[-1, 0]) == pytest.approx(wanted, rel=1e-9)
     assert np.linalg.norm(result.Lam[-1, 3:]) == pytest.approx(2.0 * G * np.cos(SLOPE), rel=1e-9)
@@ -39,22 +29,17 @@ def test_a_block_slides_down_an_incline(method, mu):
 def test_a_block_that_should_stick_creeps():
     """Where mu > tan(30 deg) the block ends at the speed at which friction carries it."""
     mu, v_tol = 0.8, 1e-3
-    result = dap.simulate(incline(mu, v_tol=v_tol), t_end=0.1, dt=0.05, rtol=1e-6)
+    result = dap.simulate(incline(SLOPE, mu, v_tol=v_tol), t_end=0.1, dt=0.05, rtol=1e-6)
     creep = v_tol * np.arctanh(np.tan(SLOPE) / mu)
     assert np.linalg.norm(result.rd[-1, 0]) == pytest.approx(creep, rel=1e-6)
 
 
 def test_a_loaded_pin_stops_its_wheel():
     """rev: a balanced wheel, load m g on a pin of radius r: w' = -mu r m g / J until it rests."""
-    mu, radius, mass, J, spin = 0.3, 0.02, 5.0, 0.1, 20.0
-    scene = dap.Scene(name="wheel")
-    scene.add_body("wheel", mass=mass, Jp=(J, J, J), w=(0.0, spin, 0.0))
-    scene.add_joint("rev", "pin", P_i="wheel.O", P_j="ground.O", a_i="wheel.y", a_j="ground.y")
-    scene.add_force("weight")
-    scene.add_force("friction", joint="pin", mu=mu, radius=radius, v_tol=1e-3)
+    scene, moment, J = wheel(spin=20.0)
+    scene.forces["rub"].fields["v_tol"] = 1e-3
     result = dap.simulate(scene, t_end=2.0, dt=1.0)
-    slowing = mu * radius * mass * G / J
-    wanted = spin - slowing * result.t
+    wanted = 20.0 - moment / J * result.t
     assert result.w[:, 0, 1] == pytest.approx(wanted, rel=1e-9)
     assert result.ledger["energy"].ok
 
@@ -82,21 +67,14 @@ def test_multipliers_that_do_not_settle_are_reported(direction, settles):
     Friction presses it down by mu sigma c R^2 / J for each newton of load, which carries
     1 / m + c^2 R^2 / J: above mu = 1.04 here no load is in balance. Sliding the other way is
     plain."""
-    lean, radius, mass, J = np.pi / 4, 0.5, 1.0, 1e-2 / 2
-    scene = dap.Scene(name="paradox")
-    p = (np.cos(lean / 2), np.sin(lean / 2), 0.0, 0.0)  # the disk's axis to (0, 1, 1) / sqrt 2
-    scene.add_body("disk", mass=mass, Jp=(J, J, J), p=p, r=(0.0, 0.0, radius * np.cos(lean)),
-                   r_dot=(0.0, direction, 0.0))  # fmt: skip
-    scene.add_joint("disk", "contact", body_i="disk", slip="z", radius=radius)
-    scene.add_force("weight")
-    scene.add_force("friction", joint="contact", mu=3.0, v_tol=1e-3)
+    scene = leaning_disk(direction, mu=3.0, v_tol=1e-3)
     notes = " ".join(dap.simulate(scene, t_end=0.0).notes)
     assert ("did not settle" in notes) is not settles
 
 
 def test_a_scene_without_friction_compiles_and_keeps_nothing_of_it():
     """No loop, no memory: the arrays are empty."""
-    scene = incline(0.0)
+    scene = incline(SLOPE, 0.0, v_tol=1e-3)
     del scene.forces["rub"]
     system = dap.compile(scene).evaluator.system
     assert system.friction.size == 0

@@ -38,12 +38,6 @@ def test_pendulum(t, integrator):
     assert -result.Lam[-1, 0] * 1.0 == pytest.approx(tension, abs=1e-8)
 
 
-def test_pendulum_tension_throughout():
-    """A01: the tension is -3 m g y at every reported instant (closed form)."""
-    result = dap.simulate(problems.pendulum(), t_end=10.0, dt=0.1, **TIGHT)
-    assert -result.Lam[:, 0] == pytest.approx(-3 * 9.81 * result.r[:, 0, 1], abs=1e-8)
-
-
 G1 = {
     1.0: ((0.50197928606713736, 2.1789944461516021, 0.025711240346541824),
           (0.43481556121841506, 0.22861801825632731, 0.86026649603480991, 0.13642135188765252)),

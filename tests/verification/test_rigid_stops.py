@@ -6,6 +6,7 @@ end is known to 1e-9 s, as the last of them, below 1e-13 of the length, are summ
 
 import numpy as np
 import pytest
+from verification.test_sticking_friction import hinge
 
 import dap3d_core as dap
 
@@ -19,14 +20,6 @@ def falling(**stop):
     scene.add_force("weight", "gravity", gravity=g)
     if stop:
         scene.add_force("plane_stop", "stop", P_i="ball.O", **stop)
-    return scene
-
-
-def hinge(**limits):
-    scene = dap.Scene(name="hinge")
-    scene.add_body("wheel", mass=m, Jp=(0.5, 0.5, 0.3), w=(0.0, 0.0, 2.0))
-    scene.add_joint("rev", "axle", P_i="wheel.O", P_j="ground.O", a_i="wheel.z", a_j="ground.z",
-                    **limits)  # fmt: skip
     return scene
 
 

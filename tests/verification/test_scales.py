@@ -215,9 +215,7 @@ def test_work_between_two_reports_is_a_scale_of_the_energy(duration):
 
 def test_fixed_steps_that_are_too_long_are_not_called_right():
     """rk4 at 20 steps a period keeps the energy of a swing; at 4 it loses a part of it."""
-    scene = dap.Scene(name="swing")
-    scene.add_body("m", mass=1.0, Jp=[0.1, 0.1, 0.1], r=[1.5, 0.0, 0.0])
-    scene.add_force("ptp", "s", P_i="m.O", P_j="ground.O", k=(2.0 * np.pi) ** 2, l0=1.0)
+    scene = seismometer(0.5)
     for step, right in ((0.01, True), (0.25, False)):
         result = dap.simulate(scene, t_end=5.0, dt=0.5, integrator="rk4", step=step)
         assert result.ledger["energy"].ok is right, result.ledger["energy"]

@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from support import problems, redundant
+from support import problems, redundant, singular
 
 import dap3d_core as dap
 
@@ -110,7 +110,7 @@ def test_bricard():
     assert (rank.rows, rank.rank, rank.dof, compiled.method) == (30, 29, 1, "lsq")
     for limit, settings in ((1e-6, {}), (1e-10, {"rtol": 1e-11, "atol": 1e-13})):
         result = dap.simulate(compiled, t_end=2.0, dt=0.5, **settings)
-        head = list(result.model.point_names).index("head1")
+        head = list(result.model.point_names).index("end1")
         found = result.rP[[1, 2, 4], head]
         assert redundant.error_of(found, np.array(list(A04.values()))) < limit
         assert result.energy.total[0] == pytest.approx(-29.43, abs=1e-12)
@@ -141,7 +141,7 @@ def test_the_implicit_integrator_with_redundant_rows(rtol):
     result = dap.simulate(
         redundant.bricard(), t_end=2.0, dt=0.5, integrator="radau", rtol=rtol, atol=rtol / 100
     )
-    head = list(result.model.point_names).index("head1")
+    head = list(result.model.point_names).index("end1")
     found = result.rP[[1, 2, 4], head]
     assert redundant.error_of(found, np.array(list(A04.values()))) < max(10 * rtol, 1e-8)
     assert result.stats.steps < 400
@@ -218,9 +218,9 @@ def test_a_dead_centre_that_is_singular_in_two_ways(rtol):
     Closed form. Work beside the pose is known to 1e-9 J, by which the energy line at 1e-12 is
     off."""
     result = dap.simulate(
-        redundant.dead_centre(), t_end=2.0, dt=0.08, integrator="dop853", rtol=rtol, atol=rtol / 100
+        singular.dead_centre(), t_end=2.0, dt=0.08, integrator="dop853", rtol=rtol, atol=rtol / 100
     )
-    angle, _ = redundant.dead_centre_angles(result.t)
+    angle = redundant.dead_centre_angle(result.t)
     centre = 0.5 * np.transpose([np.cos(angle), np.sin(angle)])
     np.testing.assert_allclose(result.r[:, 0, :2], centre, atol=1e-9)
     assert all(entry.ok for entry in result.ledger.values()) or rtol < 1e-11

@@ -25,6 +25,15 @@ def ball(height=0.0, v=3.0, **material):
     return collide(scene, **material)
 
 
+def declared_ball(height=0.0, v=3.0, **contact):
+    """The same ball by a declared contact."""
+    scene = dap.Scene(name="declared")
+    scene.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=[0.0, 0.0, 0.1 + height], r_dot=[v, 0, 0])
+    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1, **contact)
+    scene.add_force("weight", "gravity")
+    return scene
+
+
 def slope():
     """A box on a slope of 0.35 rad, within its cone of mu = 0.5."""
     angle, scene = 0.35, dap.Scene(name="slope")
@@ -69,10 +78,7 @@ def test_a_ball_that_slides_then_rolls_has_the_second_order(declared):
     """Slip that ends unseen within a step costs less than mu G h^2; first order h v0 / 7."""
     scene, v0, mu = ball(mu=0.3), 3.0, 0.3
     if declared:
-        scene = dap.Scene(name="declared")
-        scene.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=[0, 0, 0.1], r_dot=[v0, 0, 0])
-        scene.add_contact("ball_plane", P_i="ball.O", radius=0.1, mu=mu)
-        scene.add_force("weight", "gravity")
+        scene = declared_ball(mu=mu)
     end = 2.0 / 7.0 * v0 / (mu * G)
     exact = v0 * end - 0.5 * mu * G * end**2 + 5.0 / 7.0 * v0 * (1.0 - end)
     for h in (8e-3, 2e-3):
@@ -133,11 +139,10 @@ def test_a_ball_rolls_over_the_seams_of_a_height_field():
 
 def test_forces_and_modes_of_declared_contacts_are_those_of_the_step():
     """The ball of before slides for 2 v0 / (7 mu G), then rolls without friction."""
-    scene, mu = dap.Scene(name="declared"), 0.3
-    scene.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=[0, 0, 0.1], r_dot=[3.0, 0, 0])
-    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1, mu=mu)
-    scene.add_force("weight", "gravity")
-    result = dap.simulate(scene, t_end=0.4, dt=0.1, contact="stepping", contact_step=2e-3)
+    mu = 0.3
+    result = dap.simulate(
+        declared_ball(mu=mu), t_end=0.4, dt=0.1, contact="stepping", contact_step=2e-3
+    )
     floor = result.contact("floor")
     assert floor.mode.tolist() == [1, 1, 1, 2, 2]  # to 0.291 s
     assert floor.normal_force == pytest.approx(2.0 * G, rel=1e-12)
@@ -210,11 +215,9 @@ def test_what_rests_on_a_slope_has_no_work_of_friction():
 
 def test_stepping_tends_to_events():
     """A ball dropped onto a floor, e = 0: it differs by less than what it falls in a step."""
-    declared = dap.Scene(name="declared")
-    declared.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=[0, 0, 0.3], r_dot=[1.0, 0, 0])
-    declared.add_contact("ball_plane", P_i="ball.O", radius=0.1, mu=0.3)
-    declared.add_force("weight", "gravity")
-    exact = dap.simulate(declared, t_end=0.5, dt=0.5, contact="events").r[-1, 0]
+    exact = dap.simulate(declared_ball(0.2, 1.0, mu=0.3), t_end=0.5, dt=0.5, contact="events").r[
+        -1, 0
+    ]
     for h in (8e-3, 2e-3):
         found = dap.simulate(ball(0.2, 1.0, mu=0.3), t_end=0.5, dt=0.5, contact_step=h).r[-1, 0]
         assert np.abs(found - exact).max() < G * h**2
@@ -228,12 +231,11 @@ def test_stepping_extrapolates_to_events(what):
     The box falls on four corners for 0.2 s and bounces by e = 0.5, so that impacts are at ends of
     steps of all lengths; friction that stops it, or lets the ball roll, ends within a step.
     """
-    scene = dap.Scene(name=what)
-    scene.add_force("weight", "gravity")
     if what == "rolls":
-        scene.add_body("body", mass=2.0, Jp=[0.008] * 3, r=[0, 0, 0.1], r_dot=[3, 0, 0])
-        scene.add_contact("ball_plane", P_i="body.O", radius=0.1, mu=0.3)
+        scene = declared_ball(mu=0.3)
     else:
+        scene = dap.Scene(name=what)
+        scene.add_force("weight", "gravity")
         z, e, v = (0.5 * G * 0.2**2, 0.5, [0.7, 0, 0]) if what == "bounces" else (0, 0, [1, 0.5, 0])
         scene.add_body("body", mass=2.0, Jp=[0.02] * 3, r=[0, 0, 0.1 + z], r_dot=v)
         mu = 0.0 if what == "bounces" else 0.3

@@ -150,17 +150,21 @@ def test_an_overhung_shaft_in_two_bearings():
     assert load[:-2] == pytest.approx(m * G * c / L, rel=1e-9)
 
 
-def test_a_ball_joint_stops_about_any_axis():
-    """A ball of inertia J about its centre: w' = -mu R m g / J along w, which keeps its way."""
-    m, inertia, mu, R = 2.0, 0.05, 0.3, 0.04
-    w = np.array([1.0, -2.0, 2.0])
+def socket(w=(0.0, 0.0, 0.0), m=2.0, inertia=0.05, mu=0.3, radius=0.04):
     scene = dap.Scene(name="ball")
     scene.add_body("ball", mass=m, Jp=[inertia] * 3, w=tuple(w))
     scene.add_joint("sph", "socket", P_i="ball.O", P_j="ground.O")
     scene.add_force("weight")
-    scene.add_force("friction", "rub", joint="socket", mu=mu, radius=R)
+    scene.add_force("friction", "rub", joint="socket", mu=mu, radius=radius)
+    return scene, mu * radius * m * G, inertia
+
+
+def test_a_ball_joint_stops_about_any_axis():
+    """A ball of inertia J about its centre: w' = -mu R m g / J along w, which keeps its way."""
+    w = np.array([1.0, -2.0, 2.0])
+    scene, moment, inertia = socket(w)
     result = dap.simulate(scene, t_end=1.0, dt=0.125, **TIGHT)
-    a = mu * R * m * G / inertia
+    a = moment / inertia
     (stick,) = result.events
     assert stick.t == pytest.approx(3.0 / a, rel=0, abs=1e-9)
     wanted = np.maximum(1.0 - a * result.t / 3.0, 0.0)[:, None] * w
@@ -170,16 +174,11 @@ def test_a_ball_joint_stops_about_any_axis():
 @pytest.mark.parametrize("part", [0.99, 1.01])
 def test_a_ball_joint_holds_in_all_directions(part):
     """A moment about an oblique axis, against mu R m g."""
-    m, inertia, mu, R = 2.0, 0.05, 0.3, 0.04
     about = np.array([1.0, -2.0, 2.0]) / 3.0
-    scene = dap.Scene(name="ball")
-    scene.add_body("ball", mass=m, Jp=[inertia] * 3)
-    scene.add_joint("sph", "socket", P_i="ball.O", P_j="ground.O")
-    scene.add_force("weight")
-    scene.add_force("friction", "rub", joint="socket", mu=mu, radius=R)
-    scene.add_force("n", "push", body_i="ball", n=tuple(part * mu * R * m * G * about))
+    scene, moment, inertia = socket()
+    scene.add_force("n", "push", body_i="ball", n=tuple(part * moment * about))
     result = dap.simulate(scene, t_end=1.0, dt=0.5, **TIGHT)
-    a = max(part - 1.0, 0.0) * mu * R * m * G / inertia
+    a = max(part - 1.0, 0.0) * moment / inertia
     assert result.w[-1, 0] == pytest.approx(a * about, rel=1e-9, abs=1e-15)
 
 
@@ -285,22 +284,28 @@ def test_a_wedge_beyond_the_angle_of_friction_jams(push):
         assert not moves or abs(result.ledger["energy"].value) < 1e-9
 
 
+def leaning_disk(direction, **friction):
+    """A disk of 1 kg, 0.5 m and 5e-3 kg m^2 that leans by 45 degrees and slides along y."""
+    lean = np.pi / 4
+    scene = dap.Scene(name="paradox")
+    p = (np.cos(lean / 2), np.sin(lean / 2), 0.0, 0.0)  # the disk's axis to (0, 1, 1) / sqrt 2
+    scene.add_body("disk", mass=1.0, Jp=[5e-3] * 3, p=p, r=(0.0, 0.0, 0.5 * np.cos(lean)),
+                   r_dot=(0.0, direction, 0.0))  # fmt: skip
+    scene.add_joint("disk", "plane", body_i="disk", slip="z", radius=0.5)
+    scene.add_force("weight")
+    scene.add_force("friction", "rub", joint="plane", **friction)
+    return scene
+
+
 @pytest.mark.parametrize(("mu", "direction"), [(3.0, -1.0), (1.0, 1.0), (3.0, 1.0)])
 def test_a_leaning_disk_and_its_paradox(mu, direction):
     """Painleve: N (1 / m + c^2 R^2 / J -+ mu sigma c R^2 / J) = g, and none where that is negative.
 
     A jam is named; before it N is right to 1e-9, however near.
     """
-    lean, R, m, J = np.pi / 4, 0.5, 1.0, 1e-2 / 2
-    scene = dap.Scene(name="paradox")
-    p = (np.cos(lean / 2), np.sin(lean / 2), 0.0, 0.0)  # the disk's axis to (0, 1, 1) / sqrt 2
-    scene.add_body("disk", mass=m, Jp=(J, J, J), p=p, r=(0.0, 0.0, R * np.cos(lean)),
-                   r_dot=(0.0, direction, 0.0))  # fmt: skip
-    scene.add_joint("disk", "plane", body_i="disk", slip="z", radius=R)
-    scene.add_force("weight")
-    scene.add_force("friction", "rub", joint="plane", mu=mu)
-    part = 0.5 * R * R / J
-    carries = 1.0 / m + part - direction * mu * part
+    scene = leaning_disk(direction, mu=mu)
+    part = 0.5 * 0.5**2 / 5e-3
+    carries = 1.0 + part - direction * mu * part
     if carries < 0.0:
         with pytest.raises(dap.SimulationError, match="contact rub jams: its friction presses"):
             dap.simulate(scene, t_end=0.0)

@@ -34,7 +34,7 @@ RUNS = [*QUICK, *short_runs(0.001)]
 MORE = """
 from support.problems import everything
 from support.on_axles import wheel
-from support import loops, redundant, singular, trees
+from support import loops, singular, trees
 from unit.study.batch.test_batch import ensemble, pendulum
 from unit.study.batch.test_lanes import CASES
 
@@ -53,7 +53,7 @@ rubbing = loops.spatial_four_bar()
 rubbing.add_force("friction", joint="J2", mu=0.2, radius=0.05, v_tol=0.1)
 for scene in (rubbing, "bicycle", "A04", "fourbar3"):
     recorder.record(dap.simulate, scene, t_end=0.01, dt=0.005, method="joint")
-for scene, end in ((singular.flat_parallelogram(), 0.5), (redundant.dead_centre(), 1.2)):
+for scene, end in ((singular.flat_parallelogram(), 0.5), (singular.dead_centre(), 1.2)):
     recorder.record(dap.simulate, scene, t_end=end, dt=end, rtol=1e-6)
 for case in CASES.values():
     recorder.record(points, *case)
