@@ -1,6 +1,7 @@
 """The command line: each command makes one call of the library and presents the result."""
 
 from collections.abc import Sequence
+from typing import NoReturn
 
 __all__ = ["main"]
 
@@ -22,10 +23,30 @@ def main(argv: Sequence[str] | None = None) -> int:
             gc.set_threshold(COLLECT_AFTER, *gc.get_threshold()[1:])
         from dap3d_core.cli.app import run_line
 
-        return run_line(argv)
+        code = run_line(argv)
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
-        return 130
+        code = 130
     finally:
         if argv is None:
             gc.freeze()  # the process ends: its last collections would go through all there is
+    if argv is None and code == 130:
+        _leave(code)
+    return code
+
+
+def _leave(code: int) -> NoReturn:
+    """End the process without taking the interpreter down.
+
+    That aborts it where Ctrl-C has stopped the import of a package of compiled code half way.
+    """
+    import atexit
+    import contextlib
+    import os
+    import sys
+
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError):
+            stream.flush()
+    os._exit(code)
