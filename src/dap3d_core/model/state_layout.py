@@ -117,6 +117,13 @@ def by_body(u: Floats) -> Floats:
     return np.concatenate([q, v], axis=-1)
 
 
+def at_rest(u: Floats) -> Floats:
+    """The state (13 n,) without velocities."""
+    still = u.copy()
+    velocities_of(still)[:] = 0.0
+    return still
+
+
 def split(u: ArrayLike) -> tuple[Floats, Floats, Floats, Floats]:
     """Views r (..., n, 3), p (..., n, 4), r_dot (..., n, 3), w (..., n, 3) of states u or y."""
     u = np.asarray(u, dtype=float)

@@ -39,7 +39,6 @@ from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.control.held_inputs import HeldInputs
 from dap3d_core.simulation.events.contact_jumps import ContactJumps
 from dap3d_core.simulation.events.uncarried_contact import UncarriedContact
-from dap3d_core.simulation.initial.assemble import model_size
 from dap3d_core.simulation.initial.breakpoints import SEEN
 from dap3d_core.simulation.run_state import Callbacks, jumps_of
 from dap3d_core.simulation.settings import compiled_for, settings_of
@@ -233,7 +232,7 @@ class StartCode:
         unit = UNIT_METRIC.copy()
         unit[0] = model.length
         starting = np.zeros(initial_state.STARTING + evaluator.plan.row_size)
-        starting[initial_state.SIZE] = model_size(evaluator)
+        starting[initial_state.SIZE] = evaluator.model.size
         without = evaluator.system.row[np.flatnonzero(~model.position_row)]
         starting[initial_state.STARTING + without] = 1.0
         given = np.concatenate([model.u0, model.initial_states])

@@ -11,7 +11,7 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Group, Model
-from dap3d_core.model.state_layout import velocities_of
+from dap3d_core.model.state_layout import at_rest, velocities_of
 from dap3d_core.registry.suggestions import some
 from dap3d_core.result import information
 from dap3d_core.simulation.equilibrium.search import (
@@ -122,8 +122,7 @@ def _hold_contacts(evaluator: Evaluator, u: Floats, where: str) -> None:
     from dap3d_core.formulations.contacts.contact_table import GAP, ContactTable, words_of_drive
     from dap3d_core.formulations.contacts.decide import find_modes_at_rest
 
-    table, still = ContactTable(evaluator), u.copy()
-    velocities_of(still)[:] = 0.0
+    table, still = ContactTable(evaluator), at_rest(u)
     gaps, limit = table.outputs(0.0, still)[:, GAP], TOUCHING * table.length
     s, touching = table.arrays(), np.flatnonzero(gaps < limit)
     s.y[:] = evaluator.integrated(still)

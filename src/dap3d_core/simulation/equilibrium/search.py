@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics, at_rest, displacement
+from dap3d_core.model.state_layout import at_rest
+from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics, displacement
 from dap3d_core.simulation.errors import AssemblyError
 
 #: A stiffness below this part of the largest is none: rounding errors of K.

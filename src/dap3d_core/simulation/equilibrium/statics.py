@@ -21,7 +21,7 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.function_lists import call_loop
 from dap3d_core.linear.rank.rank import tolerance_of
 from dap3d_core.model.element_states import ElementState, first_states, width_of
-from dap3d_core.model.state_layout import join, split
+from dap3d_core.model.state_layout import split
 from dap3d_core.simulation.errors import AssemblyError, SimulationError
 from dap3d_core.simulation.initial.assemble import fit_of, weights_of
 from dap3d_core.simulation.initial.least_change import displaced, finite_rows, sparse_least_change
@@ -220,12 +220,6 @@ class Statics:
             return 0
         blur = fit_of(self.evaluator.model)
         return int(np.sum(values > max(tolerance_of(*shape) * values[0], blur)))
-
-
-def at_rest(u: Floats) -> Floats:
-    """The state without velocities."""
-    r, p, v, w = split(u)
-    return join(r, p, np.zeros_like(v), np.zeros_like(w))
 
 
 def displacement(u: Floats, other: Floats) -> tuple[Floats, Floats]:

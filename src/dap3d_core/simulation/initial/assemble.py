@@ -17,7 +17,7 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.linear.rank.rank import DENSE_ROWS
 from dap3d_core.model import Model
-from dap3d_core.model.state_layout import split, state_layout, velocities_of
+from dap3d_core.model.state_layout import at_rest, split, state_layout, velocities_of
 from dap3d_core.result import Note, information
 from dap3d_core.scene import Body, Scene
 from dap3d_core.simulation.errors import AssemblyError
@@ -274,11 +274,6 @@ def fit_of(model: Model) -> float:
     return FIT * min(1.0, model.size / model.length)
 
 
-def model_size(evaluator: Evaluator) -> float:
-    """A length of the model, m."""
-    return evaluator.model.size
-
-
 def max_speed(evaluator: Evaluator, v: Floats) -> float:
     """Largest speed at velocities (6 n,), in rad/s or lengths of the model a second."""
     x = np.abs(v.reshape(-1, 6))
@@ -413,8 +408,7 @@ def _closing(
     direction: Floats,
 ) -> Floats:
     """(f, f) the quadratic form by which motions along ways (f, 6 n) close a gap, rows (m,)."""
-    still = u.copy()
-    velocities_of(still)[:] = 0.0
+    still = at_rest(u)
 
     def closed(x: Floats) -> float:
         gamma = quadratic_part(evaluator, still, displacements(evaluator, x, metric).ravel(), t)

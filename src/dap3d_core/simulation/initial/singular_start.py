@@ -23,7 +23,7 @@ from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.linear.rank.rank import DENSE_ROWS, Rank
-from dap3d_core.model.state_layout import split, velocities_of
+from dap3d_core.model.state_layout import at_rest, split, velocities_of
 from dap3d_core.simulation.initial.assemble import max_speed
 from dap3d_core.simulation.initial.least_change import (
     displaced,
@@ -113,8 +113,7 @@ def singular_start(evaluator: Evaluator, u: Floats, rank: Rank, t: float) -> Sin
 def _loses_rank(evaluator: Evaluator, u: Floats, rank: Rank, t: float) -> bool:
     """True if redundant rows forbid, at second order, velocities that all rows allow."""
     n = evaluator.model.body_count
-    still = u.copy()
-    velocities_of(still)[:] = 0.0
+    still = at_rest(u)
     rows = finite_rows(evaluator, t, still)
     if not np.bincount(rows.row, rows.value**2, minlength=rows.shape[0]).all():
         return False  # a row without a gradient is named where the run stops
@@ -152,8 +151,7 @@ class _Cone:
     def __init__(self, evaluator: Evaluator, u: Floats, rank: Rank, t: float) -> None:
         self.evaluator, self.u, self.t = evaluator, u, t
         n = evaluator.model.body_count
-        self.still = u.copy()
-        velocities_of(self.still)[:] = 0.0
+        self.still = at_rest(u)
         rows = finite_rows(evaluator, t, u)
         scale, frame = self._scaling = mass_scaling(evaluator)
         block = rows.dense().reshape(-1, n, 6)

@@ -21,7 +21,6 @@ from dap3d_core.simulation.initial.assemble import (
     Initial,
     correction_notes,
     distance,
-    model_size,
 )
 from dap3d_core.simulation.initial.breakpoints import stops_of
 from dap3d_core.simulation.initial.undefined_directions import undefined_directions
@@ -346,7 +345,7 @@ class ModelRebuilder:
             return None  # a batch shares the functions of time, and inputs stand with them
         if not np.array_equal(effects_of(evaluator.switches), self._terminal):
             return None
-        if undefined_directions(checked.scene, model, start.u, model_size(evaluator)):
+        if undefined_directions(checked.scene, model, start.u, evaluator.model.size):
             return None
         notes = start_notes(start, evaluator, checked.scene)
         warnings = tuple(warnings_of(notes))

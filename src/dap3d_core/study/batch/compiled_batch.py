@@ -22,7 +22,7 @@ from dap3d_core.kernels.runtime.function_lists import INTEGER, LOOP_LIST, proced
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.scene import Simulation
-from dap3d_core.simulation.initial.assemble import SMALL_CORRECTION, distance, model_size
+from dap3d_core.simulation.initial.assemble import SMALL_CORRECTION, distance
 from dap3d_core.simulation.initial_state import InitialState
 from dap3d_core.simulation.settings import fits, integration_options
 from dap3d_core.study.batch import driver, initial_state
@@ -111,7 +111,7 @@ class CompiledBatch:
         times: (nt,) reporting times.
         stops: times that no step crosses, and whether something jumps there.
         """
-        self.evaluator, self.size = evaluator, model_size(evaluator)
+        self.evaluator, self.size = evaluator, evaluator.model.size
         y0 = self.last_start = evaluator.coordinates.start(evaluator.model.u0)
         may_turn_stiff = settings.integrator == "auto" and fits(IMPLICIT, evaluator.formulation)
 

@@ -29,7 +29,6 @@ from dap3d_core.model.state_layout import join, split, u_from_y, y_from_u
 from dap3d_core.scene import Instance, ValidatedScene
 from dap3d_core.scene.validate.bodies import SMALLEST_INERTIA, ZERO_INERTIA
 from dap3d_core.scene.validate.coerce_values import LARGEST
-from dap3d_core.simulation.initial.assemble import model_size
 from dap3d_core.simulation.initial.undefined_directions import are_undefined
 from dap3d_core.study.parameters import SceneParameter
 
@@ -202,7 +201,7 @@ class ParameterMap:
             return numbers.reshape(count, *group.numbers.shape)
 
         u = u_from_y(y0, evaluator.model.state_count)
-        return are_undefined(evaluator.model, u, numbers_of, model_size(evaluator))
+        return are_undefined(evaluator.model, u, numbers_of, evaluator.model.size)
 
     # ------------------------------------------------------------------ one parameter
 

@@ -11,13 +11,14 @@ from support.state_types import ZERO
 
 import dap3d_core as dap
 from dap3d_core.interface import Body, Force, body, number
+from dap3d_core.model import state_layout
 from dap3d_core.simulation.equilibrium import statics as module
 
 
 def statics_of(scene):
     evaluator = dap.compile(scene).evaluator
     evaluator.start(0.0, evaluator.model.u0)
-    return module.Statics(evaluator), module.at_rest(evaluator.model.u0)
+    return module.Statics(evaluator), state_layout.at_rest(evaluator.model.u0)
 
 
 def test_positions_are_closed_to_rounding():
