@@ -49,3 +49,10 @@ def test_nothing_is_overwritten_without_force(dap3d, refuse, arm):
     dap3d.succeed("export", "arm", "--format", "mjcf")
     assert "exists; --force" in refuse("export", "arm", "--format", "mjcf")
     assert dap3d.succeed("export", "arm", "--format", "mjcf", "--force", "--quiet").stdout == ""
+
+
+def test_output_is_a_folder(refuse, arm):
+    said = refuse("import", "arm.urdf", "-o", "arm.toml")
+    assert "arm.toml looks like a file; -o names the folder for scene.toml and the meshes" in said
+    assert not (arm / "arm.toml").exists()
+    assert "arm.urdf is a file; -o names" in refuse("import", "arm.urdf", "-o", "arm.urdf")

@@ -82,13 +82,14 @@ def import_model(
     from dap3d_core.cli.console.console import show_data
     from dap3d_core.formats.import_model import ImportReport
 
+    folder = Path(output or Path(file).resolve().stem)
+    if folder.is_file() or (folder.suffix == ".toml" and not folder.is_dir()):
+        why = "is a file" if folder.is_file() else "looks like a file"
+        raise Refused(f"{folder} {why}; -o names the folder for scene.toml and the meshes")
     scene, report = dap.import_model(
         file, format=kind, packages=_pairs("--package", packages), shapes=not no_shapes,
         arguments=_pairs("--arg", arguments, ":="), positions=_numbers(positions), **given,
     )  # fmt: skip
-    folder = Path(output or Path(file).resolve().stem)
-    if folder.is_file():
-        raise Refused(f"{folder} is a file; -o names a folder")
     _make(folder)
     if not isinstance(report, ImportReport):
         from dap3d_core.cli.commands.import_matlab import write_folder
