@@ -126,7 +126,8 @@ def add_error(
         return
     steps = second.stats.steps
     result.arrays = result.arrays.with_error(estimated_error(result.u, second.u, steps))
-    note = information(f"its error is estimated by a second run at {words} ({steps:,} steps)")
+    by = f"by a second run at {words} ({steps:,} steps)"
+    note = information(f"the error of the result is estimated {by}")
     _amend(result, output, note, *_divergence_note(result))
 
 
