@@ -133,7 +133,7 @@ class Scene(SceneTables, SceneDisplay):
 
         Args:
             name: without dots, not used by another material.
-            fields: mu, mu_s, mu_roll, mu_spin, e, law, with_, as in ``Material``.
+            fields: mu, mu_s, mu_roll, mu_spin, e, law, ``with_``, as in ``Material``.
 
         Raises:
             SceneError: the name is taken or illegal, or a key is unknown.

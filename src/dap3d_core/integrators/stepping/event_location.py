@@ -58,9 +58,9 @@ CUT_SHORT = 1e-3
 #: A change of a switch by this part of its band is rounding.
 SAME = 1.0 / 32.0
 #: Attempts in a row that may be cut because a polynomial, and no sample, shows two crossings; its
-#: values in a step that are compared; and the error of a cubic, as a part of its drop: of a sine
-#: 5 % in a step of 1.5 rad, 20 % in one of 3.
-MAX_SUSPICIONS, PLACES, CUBIC_ERROR = 8, 16, 0.25
+#: values in a step that are compared, and Newton steps to the least; and the error of a cubic, as a
+#: part of its drop: of a sine 5 % in a step of 1.5 rad, 20 % in one of 3.
+MAX_SUSPICIONS, PLACES, NEWTON_STEPS, CUBIC_ERROR = 8, 16, 3, 0.25
 #: Newton steps for derivatives of an instant; each leaves the error of the rate, 1e-4 as a rule.
 CROSSING_PASSES = 4
 #: A switch that changes its sign more often than this while time advances by less than this part of
@@ -232,17 +232,30 @@ def lowest_between(a: float, b: float, c: float, d: float, part: float, middle: 
     p2, p3 = 3.0 * (c - a) - 2.0 * b - d, b + d - 2.0 * (c - a)
     p4 = (middle - a - part * (b + part * (p2 + part * p3))) / weight
     between = 0.5 * (a + c) + (b - d) / 6.0 + p4 / 6.0
-    if min(a + 0.25 * b, c - 0.25 * d, between) > 0.0:  # of Bezier's points none is across
+    if min(a + 0.25 * b, c - 0.25 * d, between) > 0.5 * c:  # Bezier's points: clear of zero
         return 1.0
-    low, high, top, x = min(a, c), a, a, 1.0
-    for k in range(1, PLACES):
-        at_k = k / PLACES
-        left = at_k * (1.0 - at_k)
-        value = a + at_k * (b + at_k * (p2 + at_k * p3)) + p4 * left * left
+    low, high, top, x = a, a, a, 0.0
+    for k in range(1, PLACES + 1):
+        value = quartic(a, b, p2, p3, p4, k / PLACES)
         top = max(top, value)
         if value < low:
-            low, high, x = value, top, at_k
+            low, high, x = value, top, k / PLACES
+    for _ in range(NEWTON_STEPS):
+        slope = b + x * (2.0 * p2 + 3.0 * p3 * x + p4 * (2.0 - x * (6.0 - 4.0 * x)))
+        bend = 2.0 * p2 + 6.0 * p3 * x + p4 * (2.0 - 12.0 * x * (1.0 - x))
+        if bend > abs(slope) * PLACES:
+            x -= slope / bend
+    if not 0.0 < x < 1.0:
+        return 1.0
+    low = min(low, quartic(a, b, p2, p3, p4, x))
     return 1.0 if low >= (1.0 if b > 0.0 else CUBIC_ERROR) * (min(high, c) - low) else x
+
+
+@compiled
+def quartic(a: float, b: float, p2: float, p3: float, p4: float, x: float) -> float:
+    """A cubic by its coefficients, and a quartic that is flat at 0 and 1."""
+    left = x * (1.0 - x)
+    return a + x * (b + x * (p2 + x * p3)) + p4 * left * left
 
 
 @compiled

@@ -33,7 +33,7 @@ def test_a_dip_that_the_ends_do_not_show_is_seen_by_a_sample():
     assert cubic_minimum(*ends) == 1.0
     x = lowest_between(*ends, 0.645, p(0.645))
     assert p(x) < 0.0
-    assert x == pytest.approx(next(r.real for r in d.roots() if 0.0 < r.real < 1.0), abs=1.0 / 16.0)
+    assert x == pytest.approx(next(r.real for r in d.roots() if 0.0 < r.real < 1.0), rel=1e-6)
     higher = ends[0] + 0.05, ends[1], ends[2] + 0.05, ends[3]
     assert lowest_between(*higher, 0.645, p(0.645) + 0.05) == 1.0
 
