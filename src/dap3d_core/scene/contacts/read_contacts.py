@@ -214,15 +214,21 @@ def _material(report: Collector, material: Material) -> Material:
     key: Key = ("materials", material.name)
     given = {name: getattr(material, name) for name in LARGEST}
     found: dict[str, Any] = {n: _coefficient(report, (*key, n), x) for n, x in given.items()}
-    mu, mu_s = found["mu"] or 0.0, found["mu_s"]
-    if mu_s is not None and mu_s < mu:
-        what = f"is less than mu = {mu:g}; what slides would stick more than rest"
-        report.add((*key, "mu_s"), mu_s, what)
+    if not _can_rest(report, key, found["mu"] or 0.0, found["mu_s"]):
         found["mu_s"] = None
     if material.law is not None:
         law = report.read((*key, "law"), material.law, lambda word: word_of(word, LAWS))
         found["law"] = None if isinstance(law, Fault) else law
     return Material(material.name, **found)
+
+
+def _can_rest(report: Collector, key: Key, mu: Any, mu_s: float | None) -> bool:
+    """True where friction of sticking is not below that of sliding, else a mistake is reported."""
+    if mu_s is None or mu_s >= mu:
+        return True
+    what = f"is less than mu = {mu:g}; what slides would stick more than rest"
+    report.add((*key, "mu_s"), mu_s, what)
+    return False
 
 
 def _read_pair(report: Collector, key: Key, table: Any, pair: dict[str, float]) -> None:
@@ -282,9 +288,7 @@ def read_contacts(
             values = given | {"part": float(k)}
             if values["touch"]:
                 values["mode_0"] = TOUCHES  # its gap is a row as the scene is assembled
-            if values["mu_s"] is not None and values["mu_s"] < values["mu"]:
-                what = f"is less than mu = {values['mu']:g}; what slides would stick more than rest"
-                report.add(("contacts", one.name, "mu_s"), values["mu_s"], what)
+            _can_rest(report, ("contacts", one.name), values["mu"], values["mu_s"])
             found.append(attrs.evolve(one, name=name, values=values))
     return [*found, *_resisting(report, found)]
 
@@ -367,10 +371,9 @@ def read_friction(
     for force in forces:
         joint = joints[force.values[force.type_info.friction_joint]]
         given, key = force.values, ("forces", force.name)
-        if given.get("mu_s") is not None and given["mu_s"] < given["mu"]:
-            what = f"is less than mu = {given['mu']:g}; what slides would stick more than rest"
-            report.add((*key, "mu_s"), given["mu_s"], what)
-        grips = grips_of(joint.type_info)
+        _can_rest(report, key, given.get("mu"), given.get("mu_s"))
+        type_: Any = joint.type_info.type
+        grips = tuple(map(_examined, type_.grips))
         for k, grip in enumerate(grips):
             name = force.name if len(grips) == 1 else f"{force.name}#{k + 1}"
             values = SMOOTH | joint.values | HIDDEN | {"e": 0.0, "part": float(k)}
@@ -399,12 +402,6 @@ def with_unit_mass(contacts: Sequence[Instance], mass: Floats) -> list[Instance]
         unit = float(10.0 ** np.round(np.log10(lighter))) if is_light else 1.0
         found.append(attrs.evolve(one, values=one.values | {"unit_mass": unit}))
     return found
-
-
-def grips_of(joint: TypeInfo) -> tuple[TypeInfo, ...]:
-    """The friction that sticks of a type of joint."""
-    type_: Any = joint.type
-    return tuple(map(_examined, type_.grips))
 
 
 @cache

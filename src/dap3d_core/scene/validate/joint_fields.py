@@ -81,13 +81,9 @@ def _coordinate(type_info: TypeInfo | None) -> str:
 def _of_moving(report: Collector, geometry: Geometry, joint: Element, name: str) -> Any:
     """A field of a joint; of a name without slot that of the body that moves."""
     if not slot_of(name):
-        name = f"{name}_{_moving(report, geometry, joint)}"
+        moving = "j" if _field(report, geometry, joint, "body_i") == GROUND else "i"
+        name = f"{name}_{moving}"
     return _field(report, geometry, joint, name)
-
-
-def _moving(report: Collector, geometry: Geometry, joint: Element) -> str:
-    """Slot of the body of a joint that moves: j where body i is ground."""
-    return "j" if _field(report, geometry, joint, "body_i") == GROUND else "i"
 
 
 def _field(report: Collector, geometry: Geometry, joint: Element, name: str) -> Any:

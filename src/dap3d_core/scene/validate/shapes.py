@@ -49,10 +49,10 @@ class Shape:
     values: dict[str, Any]
 
 
-def _size(value: Any) -> Any:
-    size = numbers_of(value, 3)
+def _edges(value: Any, count: int = 3) -> Any:
+    size = numbers_of(value, count)
     if not isinstance(size, Fault) and min(size) <= 0.0:
-        return Fault("should be three edges, greater than 0")
+        return Fault(f"should be {'two' if count == 2 else 'three'} edges, greater than 0")
     return size
 
 
@@ -77,13 +77,6 @@ def _heights(value: Any) -> Any:
     return next((row for row in read if isinstance(row, Fault)), tuple(read))
 
 
-def _width(value: Any) -> Any:
-    size = numbers_of(value, 2)
-    if not isinstance(size, Fault) and min(size) <= 0.0:
-        return Fault("should be two edges, greater than 0")
-    return size
-
-
 def _factors(value: Any) -> Any:
     if not isinstance(value, tuple):
         factor = _NUMBER.read(value)
@@ -106,7 +99,6 @@ _AT = Field(lambda v: numbers_of(v, 3), ZERO, "centre in the axes of the body, m
 _P = Field(quaternion_of, NO_TURN, "Euler parameters of its axes in those of the body")
 _AXIS = Field(_axis, (0.0, 0.0, 1.0), "direction of its axis in the body")
 _COLOR = Field(text_of, "", "as of a body, whose colour it has when left out")
-_EDGES = Field(_size, None, "edges, 3 numbers, m")
 _ROD = {"radius": _NUMBER, "length": _NUMBER, "at": _AT, "axis": _AXIS, "color": _COLOR}
 #: Fields of shapes that may meet others.
 _MEETS = {
@@ -118,8 +110,9 @@ _MEETS = {
 
 #: Type -> its fields, besides body.
 SHAPES: Mapping[str, Mapping[str, Field]] = {
-    "box": {"size": _EDGES, "at": _AT, "p": _P, "color": _COLOR} | _MEETS,
-    "ellipsoid": {"size": Field(_size, None, "its three axes, whole, 3 numbers, m"), "at": _AT,
+    "box": {"size": Field(_edges, None, "edges, 3 numbers, m"), "at": _AT, "p": _P,
+            "color": _COLOR} | _MEETS,
+    "ellipsoid": {"size": Field(_edges, None, "its three axes, whole, 3 numbers, m"), "at": _AT,
                   "p": _P, "color": _COLOR} | _MEETS,
     "sphere": {"radius": _NUMBER, "at": _AT, "color": _COLOR} | _MEETS,
     "capsule": _ROD | _MEETS,
@@ -132,7 +125,7 @@ SHAPES: Mapping[str, Mapping[str, Field]] = {
     } | _MEETS,
     "height_field": {
         "heights": Field(_heights, None, "rows along x of heights along y, m"),
-        "size": Field(_width, None, "edges along x and y, m"),
+        "size": Field(partial(_edges, count=2), None, "edges along x and y, m"),
         "at": Field(_AT.read, ZERO, "below its middle, at height 0, in the body, m"),
         "p": _P,
         "color": _COLOR,
