@@ -200,7 +200,7 @@ def line_of(
         return "ptp", fields
     if tendon.divisors:
         fields["divisors"] = tendon.divisors
-    drums = sorted(tendon.drums, key=lambda drum: not drum.cylinder)
+    drums = tendon.ordered_drums
     if drums:
         centres = [point(drum.link, drum.at.r, f"drum{k + 1}") for k, drum in enumerate(drums)]
         fields |= {"drums": tuple(centres), "radii": tuple(drum.radius for drum in drums),

@@ -55,7 +55,7 @@ def reaction_names(
 
 def joints_read(type_info: TypeInfo) -> tuple[str, ...]:
     """The ``joint()`` fields whose reactions the kernels of a force name."""
-    used = {n for k in READING for n in _parameters(type_info, k)}
+    used = _names_read(type_info)
     return tuple(
         field
         for field in joint_fields(type_info.type)
@@ -125,7 +125,7 @@ def sample_size(type_info: TypeInfo) -> int:
 
 
 def _read(type_info: TypeInfo) -> dict[str, KernelArgument]:
-    used = {n for kernel in READING for n in _parameters(type_info, kernel)}
+    used = _names_read(type_info)
     return {n: q for n, q in reaction_names(type_info.type).items() if n in used}
 
 
@@ -195,14 +195,16 @@ def reaction_lines(
         yield f"x_moment_{field} = ({', '.join(sums[3:])})"
 
 
-def _parameters(type_info: TypeInfo, kernel: str) -> tuple[str, ...]:
-    return parameters(type_info.kernels[kernel]) if kernel in type_info.kernels else ()
+def _names_read(type_info: TypeInfo) -> set[str]:
+    """The parameters of the kernels that may name reactions."""
+    kernels = [type_info.kernels[name] for name in READING if name in type_info.kernels]
+    return {name for kernel in kernels for name in parameters(kernel)}
 
 
 def _check_own(type_info: TypeInfo, joint: JointOfForce) -> None:
     """The copy of the joint's numbers counts no turns, and has no states and no unknowns."""
     vectors = {f"force_{joint.field}", f"moment_{joint.field}"}
-    if not vectors & {n for kernel in READING for n in _parameters(type_info, kernel)}:
+    if not vectors & _names_read(type_info):
         return
     of_joint = joint.type_info
     needed = {q.name for q in in_order(of_joint.names, parameters(of_joint.kernels["J"]))}

@@ -310,6 +310,11 @@ class Tendon:
     terms: tuple[tuple[str, float], ...] = ()
     armature: float = 0.0
 
+    @property
+    def ordered_drums(self) -> list[Drum]:
+        """The drums in the order in which elements have them: cylinders first."""
+        return sorted(self.drums, key=lambda drum: not drum.cylinder)
+
 
 @attrs.frozen(eq=False)
 class Actuator:
