@@ -390,8 +390,7 @@ class _JointCoordinate:
         if builder.limits != "hard" or not builder.takes_contacts or joint.kind not in SCALAR:
             return False
         q = joint.position[0] if joint.position else 0.0
-        slack = AGREE * max(1.0, abs(q))
-        inside = limits.lower - slack <= q <= limits.upper + slack
+        inside = limits.contain(q, AGREE * max(1.0, abs(q)))
         if joint in builder.inertia.loops or not inside:
             return False
         fields = builder.scene.joints[self.name].fields

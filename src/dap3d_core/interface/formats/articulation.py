@@ -158,6 +158,10 @@ class Limits:
         """True if there is a limit on one side at least."""
         return isfinite(self.lower) or isfinite(self.upper)
 
+    def contain(self, q: float, slack: float = 0.0) -> bool:
+        """True for a coordinate between them, or beyond one by no more than a slack."""
+        return self.lower - slack <= q <= self.upper + slack
+
     @classmethod
     def between(
         cls, lower: float, upper: float, joint: str, place: Place, stiffness: float | None = None
