@@ -251,7 +251,6 @@ class _Start:
             return
         text = f"joint {joint.name} starts at {q + zero:g}, beyond its limits "
         text += f"{limits.lower + zero:g} and {limits.upper + zero:g}: "
-        text += (
-            f"it is put at {at + zero:g}" if limits.contain(at, slack) else "its stops push it back"
-        )
+        inside = limits.contain(at, slack)
+        text += f"it is put at {at + zero:g}" if inside else "its stops push it back"
         self.remarks.translate(joint.place, text, motion=True)
