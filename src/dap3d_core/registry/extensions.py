@@ -12,7 +12,7 @@ from dap3d_core.interface.hooks import EXTENSIONS
 from dap3d_core.registry.discovery import Source, discover
 from dap3d_core.registry.guard import guard, within
 from dap3d_core.registry.loading import hooks_of
-from dap3d_core.registry.registry import LOAD_LIMIT, PluginInfo, collision, info_of
+from dap3d_core.registry.registry import LOAD_LIMIT, PluginInfo, by_keyword, collision, info_of
 from dap3d_core.registry.suggestions import did_you_mean
 
 #: Module of each kind's hook and base class, and the name of the class.
@@ -79,11 +79,8 @@ def extensions(kind: str) -> Extensions:
     Args:
         kind: importer, exporter, integrator or shape.
     """
-    sources: dict[str, list[Source]] = {}
-    for source in discover((EXTENSIONS[kind][0],)):
-        if source.kind and not source.blocked:
-            sources.setdefault(source.keyword, []).append(source)
-    return Extensions(kind, sources)
+    found = (s for s in discover((EXTENSIONS[kind][0],)) if s.kind and not s.blocked)
+    return Extensions(kind, {word: same for (_, word), same in by_keyword(found).items()})
 
 
 def extension_listing(limit_s: float | None = LOAD_LIMIT) -> list[PluginInfo]:
@@ -92,10 +89,9 @@ def extension_listing(limit_s: float | None = LOAD_LIMIT) -> list[PluginInfo]:
     Args:
         limit_s: time limit of the loading of each; one that takes longer is broken.
     """
-    same: dict[tuple[str, str], list[Source]] = {}
-    for source in discover([group for group, _ in EXTENSIONS.values()]):
-        if source.kind:  # entry points that cannot be read are in the listing of types
-            same.setdefault((source.kind, source.keyword), []).append(source)
+    found = discover([group for group, _ in EXTENSIONS.values()])
+    # entry points that cannot be read are in the listing of types
+    same = by_keyword(source for source in found if source.kind)
     load = partial(_load, limit_s=limit_s)
     return [info_of(source, rivals, load) for rivals in same.values() for source in rivals]
 

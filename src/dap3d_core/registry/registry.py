@@ -1,7 +1,7 @@
 """The registry of types; each is loaded and examined on first use."""
 
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 
 import attrs
@@ -248,10 +248,15 @@ def load_registry(*, groups: Collection[str] | None = None) -> Registry:
         groups: entry-point groups to read, by default ``dap3d.joints``, ``dap3d.forces`` and
             ``dap3d.functions``; an empty collection gives an empty registry.
     """
+    return Registry(by_keyword(discover(groups)))
+
+
+def by_keyword(found: Iterable[Source]) -> dict[tuple[str, str], list[Source]]:
+    """Sources by kind and keyword; several of one where packages collide."""
     sources: dict[tuple[str, str], list[Source]] = {}
-    for source in discover(groups):
+    for source in found:
         sources.setdefault((source.kind, source.keyword), []).append(source)
-    return Registry(sources)
+    return sources
 
 
 def info_of(source: Source, rivals: list[Source], load: Callable[[Source], object]) -> PluginInfo:

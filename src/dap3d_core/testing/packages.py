@@ -87,9 +87,13 @@ def check_named(
         type_info = registry.get(kind, keyword, limit_s=LOAD_LIMIT)
         return check_type(type_info, poses=poses, seed=seed)
     except PluginError as error:
-        finding = Finding("loading", "", "", 0, str(error))
-        outcome = CheckOutcome("loading", "", "failed", "it can be loaded", findings=(finding,))
+        outcome = _not_loaded(str(error), "it can be loaded")
         return _loading_report(registry, kind, keyword, outcome)
+
+
+def _not_loaded(fault: str, words: str) -> CheckOutcome:
+    finding = Finding("loading", "", "", 0, fault)
+    return CheckOutcome("loading", "", "failed", words, findings=(finding,))
 
 
 def _loading_report(registry: Registry, kind: str, keyword: str, outcome: CheckOutcome) -> Report:
@@ -121,8 +125,7 @@ def check_packages(
         reports = []
         for source in (s for s in sources if s.distribution == name):
             if not source.kind:
-                finding = Finding("loading", "", "", 0, source.fault)
-                wrong = CheckOutcome("loading", "", "failed", "", findings=(finding,))
+                wrong = _not_loaded(source.fault, "")
                 reports.append(Report("", "", name, SEED, POSES, (wrong,)))
                 continue
             say(f"{name}: checking {source.keyword}")

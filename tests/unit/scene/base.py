@@ -107,5 +107,11 @@ def mistakes_of(scene, registry, **options):
 
 def scene_of(folder, text):
     """A scene read from a file of this text in a folder."""
-    (folder / "scene.toml").write_text(text)
-    return dap.load(folder)
+    return dap.load(with_scenes(folder, scene=text))
+
+
+def with_scenes(folder, **texts):
+    """The folder, with a file NAME.toml of each text."""
+    for name, text in texts.items():
+        (folder / f"{name}.toml").write_text(text)
+    return folder

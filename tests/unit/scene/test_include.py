@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from unit.scene.base import with_scenes
 
 import dap3d_core as dap
 from dap3d_core.scene import check as checked
@@ -203,11 +204,10 @@ def test_scripts_include_scenes(folder):
 
 def test_sub_assemblies_within_one_another(folder):
     """Places add up: 2 m along the axis x of a part that is turned to y."""
-    (folder / "pair.toml").write_text(
-        '[include.leg]\nfile = "parts/leg.toml"\nat = {r = [2.0, 0.0, 0.0]}\n'
-    )
-    (folder / "scene.toml").write_text(
-        '[include.a]\nfile = "pair.toml"\nat = {rpy = [0.0, 0.0, "90 deg"]}\n'
+    with_scenes(
+        folder,
+        pair='[include.leg]\nfile = "parts/leg.toml"\nat = {r = [2.0, 0.0, 0.0]}\n',
+        scene='[include.a]\nfile = "pair.toml"\nat = {rpy = [0.0, 0.0, "90 deg"]}\n',
     )
     scene = dap.load(folder).resolved()
     np.testing.assert_allclose(scene.bodies["a/leg/rod"].r, [0.0, 2.0, -0.5], atol=1e-15)
@@ -421,10 +421,11 @@ turn = {value = "hinge.angle / L", unit = "rad"}
 
 def test_words_of_expressions_are_those_of_the_part(tmp_path):
     """Its parameters in outputs and conditions, though the whole has others of the same names."""
-    (tmp_path / "arm.toml").write_text(ARM)
-    (tmp_path / "scene.toml").write_text(
-        '[parameters]\nL = 7.0\nT = 9.0\n[include.a]\nfile = "arm.toml"\n'
-        "[simulation]\nt_end = 0.4\ndt = 0.1\n"
+    with_scenes(
+        tmp_path,
+        arm=ARM,
+        scene='[parameters]\nL = 7.0\nT = 9.0\n[include.a]\nfile = "arm.toml"\n'
+        "[simulation]\nt_end = 0.4\ndt = 0.1\n",
     )
     run = dap.start(tmp_path)
     run.step(0.4, inputs={"a_u": 1.0})
@@ -450,16 +451,15 @@ def test_words_of_expressions_are_those_of_the_part(tmp_path):
 )
 def test_a_part_knows_no_words_of_the_whole(tmp_path, old, new, place):
     """They are mistakes, at their lines in the file of the part."""
-    (tmp_path / "arm.toml").write_text(ARM.replace(old, new))
-    (tmp_path / "scene.toml").write_text('[parameters]\nM = 1.0\n[include.a]\nfile = "arm.toml"\n')
+    whole = '[parameters]\nM = 1.0\n[include.a]\nfile = "arm.toml"\n'
+    with_scenes(tmp_path, arm=ARM.replace(old, new), scene=whole)
     with pytest.raises(dap.SceneError, match=place):
         dap.compile(tmp_path)
 
 
 def test_wrong_parameters_are_reported_where_they_are_given(tmp_path):
-    (tmp_path / "arm.toml").write_text(ARM)
-    (tmp_path / "scene.toml").write_text(
-        '[include.a]\nfile = "arm.toml"\nparameters = {L = "long"}\n'
+    with_scenes(
+        tmp_path, arm=ARM, scene='[include.a]\nfile = "arm.toml"\nparameters = {L = "long"}\n'
     )
     with pytest.raises(dap.SceneError, match=r"scene.toml:3: parameters.a_L"):
         dap.compile(tmp_path)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from unit.scene.base import with_scenes
 
 import dap3d_core as dap
 from dap3d_core.scene import parse
@@ -33,20 +34,13 @@ rtol = 1e-9
 """
 
 
-def scenes(folder, part, **others):
-    """The folder with the files ``part.toml`` and others; the last one is the scene."""
-    for name, text in {"part": part, **others}.items():
-        (folder / f"{name}.toml").write_text(text)
-    return folder
-
-
 def test_a_floor_that_is_left_out_is_that_of_the_part(tmp_path):
     """In a part of a part, turned twice, a box falls on a floor, tips and bounces as in its own
     file. Two runs at a relative tolerance of 1e-9, of six impacts."""
     g = SECOND.apply(FIRST.apply([0.0, 0.0, -1.0])).tolist()
-    scenes(
+    with_scenes(
         tmp_path,
-        BOX,
+        part=BOX,
         mid='[include.p]\nfile = "part.toml"\nat = {r = [0.1, 0.2, 0.3], rpy = [0.4, -0.2, 0.9]}\n',
         scene='[include.m]\nfile = "mid.toml"\nat = {r = [1, 0, -1], rpy = [-0.3, 0.5, 0.2]}\n'
         f'[forces.weight]\ntype = "weight"\nwgt = {g}\n{BOX[BOX.index("[simulation]") :]}',
@@ -113,9 +107,9 @@ def test_a_body_welded_to_ground_turns_with_the_part():
 
 def test_orientations_with_expressions_are_turned(tmp_path):
     """Euler parameters of a body and of its reference pose; points that are drawn move along."""
-    scenes(
+    with_scenes(
         tmp_path,
-        '[parameters]\na = 0.4\n[bodies.b]\nmass = 1.0\nJp = [1.0, 1.0, 1.0]\n'
+        part='[parameters]\na = 0.4\n[bodies.b]\nmass = 1.0\nJp = [1.0, 1.0, 1.0]\n'
         'p = ["= cos(a / 2)", "= sin(a / 2)", 0, 0]\np_0 = ["= cos(a)", "= sin(a)", 0, 0]\n'
         '[animation]\npoints = [{body = "ground", sPp = ["= a", 0, 0]}]\n',
         scene='[include.x]\nfile = "part.toml"\nat = {r = [1, 0, 0], rpy = [0, 0, "90 deg"]}\n',
@@ -141,7 +135,7 @@ def test_a_wrong_orientation_is_reported_once():
 
 @pytest.mark.parametrize("r", ["[0, 0, nan]", "[0, 0, 1e200]", '[0, 0, "1"]', "[0, 0]", "1"])
 def test_a_wrong_place_is_reported_as_such(tmp_path, r):
-    scenes(tmp_path, FALLS, scene=f'[include.a]\nfile = "part.toml"\nat = {{r = {r}}}\n')
+    with_scenes(tmp_path, part=FALLS, scene=f'[include.a]\nfile = "part.toml"\nat = {{r = {r}}}\n')
     with pytest.raises(dap.SceneError, match=r"scene.toml:3: include.a.at.r = .*3 numbers") as it:
         dap.compile(tmp_path)
     assert len(it.value.mistakes) == 1

@@ -102,10 +102,7 @@ def _act_on_link(builder: SceneBuilder, actuator: Actuator, name: str) -> None:
     force, moment = (frame.A @ np.array(actuator.wrench[k : k + 3]) for k in (0, 3))
     given = {"input": name} | _bounds(input=actuator.control)
     if force.any():
-        point = f"{body}.O"
-        if frame.r.any():
-            point = builder.names.free("points", f"{name}_point")
-            builder.scene.add_point(point, body, float_tuple(frame.r))
+        point = builder.point_at(body, frame.r, f"{name}_point")
         at = builder.names.free("forces", f"{name}_force")
         builder.scene.add_force("fp", at, P_i=point, fp=float_tuple(force), **given)
     if moment.any():
@@ -200,7 +197,7 @@ def line_of(
         return "ptp", fields
     if tendon.divisors:
         fields["divisors"] = tendon.divisors
-    drums = sorted(tendon.drums, key=lambda drum: not drum.cylinder)
+    drums = tendon.ordered_drums
     if drums:
         centres = [point(drum.link, drum.at.r, f"drum{k + 1}") for k, drum in enumerate(drums)]
         fields |= {"drums": tuple(centres), "radii": tuple(drum.radius for drum in drums),

@@ -112,6 +112,12 @@ class SceneBuilder:
             fixed = Frame(fixed.r - self.groups[group].inertial.com, fixed.A)
         return self.bodies[group], fixed
 
+    def point_at(self, body: str, at: Floats, name: str) -> str:
+        """A point of a body in its axes: its mass centre, or one of this name, which is added."""
+        if not at.any():
+            return f"{body}.O"
+        return self.scene.add_point(self.names.free("points", name), body, float_tuple(at))
+
     def moves_alone(self, joint: Joint) -> bool:
         """True if a joint's two links are one body, so that it has no effect."""
         return self.member[joint.parent][0] == self.member[joint.child][0]

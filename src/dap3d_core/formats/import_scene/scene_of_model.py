@@ -228,10 +228,8 @@ def _add_gravity(builder: SceneBuilder, gravity: Sequence[float]) -> None:
             if group.name != WORLD and link.gravcomp and link.inertial is not None:
                 body, frame = builder.attached(link.name, Frame(link.inertial.com))
                 force = float_tuple(-link.gravcomp * link.inertial.mass * np.array(gravity))
-                point, name = f"{body}.O", builder.names.free("forces", f"{body}_carried")
-                if np.abs(frame.r).max() > 0.0:
-                    point = builder.names.free("points", f"{body}_carried")
-                    scene.add_point(point, body, float_tuple(frame.r))
+                point = builder.point_at(body, frame.r, f"{body}_carried")
+                name = builder.names.free("forces", f"{body}_carried")
                 scene.add_force("f", name, P_i=point, f=force)
 
 
@@ -392,8 +390,7 @@ class _JointCoordinate:
         if builder.limits != "hard" or not builder.takes_contacts or joint.kind not in SCALAR:
             return False
         q = joint.position[0] if joint.position else 0.0
-        slack = AGREE * max(1.0, abs(q))
-        inside = limits.lower - slack <= q <= limits.upper + slack
+        inside = limits.contain(q, AGREE * max(1.0, abs(q)))
         if joint in builder.inertia.loops or not inside:
             return False
         fields = builder.scene.joints[self.name].fields

@@ -247,10 +247,10 @@ class _Start:
         if joint.name in self.closing:  # the others place it
             return
         slack = AGREE * max(1.0, abs(at))
-        if limits.lower - slack <= q <= limits.upper + slack:
+        if limits.contain(q, slack):
             return
         text = f"joint {joint.name} starts at {q + zero:g}, beyond its limits "
         text += f"{limits.lower + zero:g} and {limits.upper + zero:g}: "
-        inside = limits.lower - slack <= at <= limits.upper + slack
+        inside = limits.contain(at, slack)
         text += f"it is put at {at + zero:g}" if inside else "its stops push it back"
         self.remarks.translate(joint.place, text, motion=True)

@@ -6,6 +6,7 @@ other names of a body are reserved.
 
 from collections.abc import Callable, Iterable, Mapping
 from inspect import Parameter, signature
+from keyword import iskeyword
 from types import FunctionType
 from typing import Any
 
@@ -326,6 +327,11 @@ def parameters(kernel: Callable[..., Any]) -> tuple[str, ...]:
         return kernel.__code__.co_varnames[: kernel.__code__.co_argcount]
     positional = (Parameter.POSITIONAL_OR_KEYWORD, Parameter.POSITIONAL_ONLY)
     return tuple(n for n, p in signature(kernel).parameters.items() if p.kind in positional)
+
+
+def can_be_parameter(name: Any) -> bool:
+    """True for text that a kernel can have as a parameter."""
+    return isinstance(name, str) and name.isidentifier() and not iskeyword(name)
 
 
 def in_order(names: Mapping[str, KernelArgument], wanted: Iterable[str]) -> list[KernelArgument]:

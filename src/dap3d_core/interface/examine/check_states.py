@@ -2,11 +2,10 @@
 
 import re
 from collections.abc import Mapping
-from keyword import iskeyword
 from typing import Any
 
 from dap3d_core.interface.codegen.instance_layout import InstanceLayout
-from dap3d_core.interface.codegen.kernel_arguments import parameters
+from dap3d_core.interface.codegen.kernel_arguments import can_be_parameter, parameters
 from dap3d_core.interface.element_states import (
     GREATEST,
     INITIAL,
@@ -45,7 +44,7 @@ def check_states(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
             "declare body_i, and one element for each body"
         )
     for name, length in lengths.items():
-        if not (isinstance(name, str) and name.isidentifier() and not iskeyword(name)):
+        if not can_be_parameter(name):
             raise PluginError(f"{who}: {name!r} in states is no name that a kernel can take")
         if not isinstance(length, int) or isinstance(length, bool) or length < 1:
             raise PluginError(
@@ -144,7 +143,7 @@ def check_unknowns(type_: type[TypeBase]) -> None:
 
 def _check_name(type_: type[Joint], name: Any) -> None:
     who, specs = where_is(type_), specs_of(type_)
-    if not (isinstance(name, str) and name.isidentifier() and not iskeyword(name)):
+    if not can_be_parameter(name):
         raise PluginError(f"{who}: {name!r} in unknowns is no name that a kernel can take")
     if name in specs or name in RESERVED or name in state_lengths(type_) or slot_of(name):
         raise PluginError(

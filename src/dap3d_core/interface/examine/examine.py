@@ -8,7 +8,6 @@ import math
 import random
 from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
-from keyword import iskeyword
 from types import FunctionType
 from typing import Any
 from warnings import catch_warnings
@@ -32,6 +31,7 @@ from dap3d_core.interface.codegen.kernel_arguments import (
     VECTORS,
     VELOCITY_KERNELS,
     KernelArgument,
+    can_be_parameter,
     friction_names,
     namespace,
     parameters,
@@ -244,7 +244,7 @@ def _check_named_fields(type_: type[TypeBase], layout: InstanceLayout) -> None:
 
 
 def _constant(name: Any, value: Any, broken: Callable[[str], PluginError]) -> Any:
-    if not (isinstance(name, str) and name.isidentifier() and not iskeyword(name)):
+    if not can_be_parameter(name):
         raise broken(f"returned {name!r}, which no kernel can name as a parameter")
     try:
         constant = _as_floats(value)

@@ -158,6 +158,10 @@ class Limits:
         """True if there is a limit on one side at least."""
         return isfinite(self.lower) or isfinite(self.upper)
 
+    def contain(self, q: float, slack: float = 0.0) -> bool:
+        """True for a coordinate between them, or beyond one by no more than a slack."""
+        return self.lower - slack <= q <= self.upper + slack
+
     @classmethod
     def between(
         cls, lower: float, upper: float, joint: str, place: Place, stiffness: float | None = None
@@ -309,6 +313,11 @@ class Tendon:
     divisors: tuple[float, ...] = ()
     terms: tuple[tuple[str, float], ...] = ()
     armature: float = 0.0
+
+    @property
+    def ordered_drums(self) -> list[Drum]:
+        """The drums in the order in which elements have them: cylinders first."""
+        return sorted(self.drums, key=lambda drum: not drum.cylinder)
 
 
 @attrs.frozen(eq=False)

@@ -31,9 +31,8 @@ def rate_of_line(
         line, pose_of: as of ``length_of_line``.
         motion_of: velocity, (3,), of a point of a link, and how this turns, in global axes.
     """
-    drums = sorted(line.drums, key=lambda drum: not drum.cylinder)
     points = [tuple(motion_of(link, at)[0]) for link, at in line.points]
-    moves = [motion_of(drum.link, drum.at.r) for drum in drums]
+    moves = [motion_of(drum.link, drum.at.r) for drum in line.ordered_drums]
     speeds, turns = ([tuple(move[k]) for move in moves] for k in range(2))
     return float(cable_rate(_path(line, pose_of), points, speeds, turns))
 
@@ -42,7 +41,7 @@ def _path(line: Tendon, pose_of: Callable[[str], Frame]) -> Any:
     def place(link: str, frame: Frame) -> tuple[float, ...]:
         return tuple((pose_of(link) @ frame).r.tolist())
 
-    drums = sorted(line.drums, key=lambda drum: not drum.cylinder)
+    drums = line.ordered_drums
     axes = [tuple((pose_of(d.link) @ d.at).A[:, 2].tolist()) for d in drums if d.cylinder]
     sides = [d.side or (d.link, d.at.r) for d in drums]
     ways = tuple(INSIDE if d.inside else PAST_SIDE * (d.side is not None) for d in drums)

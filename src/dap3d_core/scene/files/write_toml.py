@@ -126,11 +126,7 @@ def _key(name: str) -> str:
 
 
 def _text(text: str) -> str:
-    return f'"{"".join(_character(c) for c in text)}"' if not _is_simple(text) else f'"{text}"'
-
-
-def _is_simple(text: str) -> bool:
-    return text.isprintable() and '"' not in text and "\\" not in text
+    return f'"{"".join(map(_character, text))}"'
 
 
 def _character(c: str) -> str:

@@ -43,12 +43,12 @@ def number_of(value: Any) -> float | Fault:
     if type(value) is float and -LARGEST <= value <= LARGEST:
         return value
     value = plain(value)
-    if type(value) is int and abs(value) <= LARGEST:
+    if type(value) in (float, int) and -LARGEST <= value <= LARGEST:
         return float(value)
     return _number_fault(value)
 
 
-def _number_fault(value: Any) -> float | Fault:
+def _number_fault(value: Any) -> Fault:
     should = "should be a number"
     if type(value) is str:
         written = value.strip().replace(",", ".")
@@ -63,8 +63,6 @@ def _number_fault(value: Any) -> float | Fault:
     if type(value) is bool:
         return Fault(f"{should}, not a truth value")
     if type(value) is int or (type(value) is float and math.isfinite(value)):
-        if abs(value) <= LARGEST:
-            return float(value)
         return Fault(f"{should} of at most {LARGEST:g} in size: products of larger ones overflow")
     if type(value) is float:
         remedy = "numbers beyond 1.8e+308 are read as inf" if math.isinf(value) else ""

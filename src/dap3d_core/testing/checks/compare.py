@@ -7,7 +7,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.testing.checks.findings import FAILED, LEFT_OUT, OK, CheckOutcome, Finding
+from dap3d_core.testing.checks.findings import FAILED, OK, CheckOutcome, Finding
 from dap3d_core.testing.samples.random_state import Direction
 from dap3d_core.testing.samples.sampled_type import Sample, SampledType
 
@@ -112,9 +112,9 @@ class Comparison:
             actual, expected = float(got[k][index]), float(want[k][index])
             wrong = Wrong(row, tuple(map(int, index)), actual, expected)
             if error > tolerance and error > self._worst.get((self.kernel, row), (0.0, None))[0]:
-                self._add((self.kernel, row), error, row + 1, says.format(x=wrong, **words or {}),
-                          sample, wrong.error,
-                          tolerance * size)  # fmt: skip
+                text = says.format(x=wrong, **words or {})
+                finding = self._finding(row + 1, text, sample, wrong.error, tolerance * size)
+                self._worst[self.kernel, row] = error, finding
 
     def fail(self, words: str, sample: Sample | None = None, row: int = 0) -> None:
         """Add a finding without a size."""
@@ -133,11 +133,6 @@ class Comparison:
             self.check, variant, state, self.words, error, self.differences, notes, findings
         )
 
-    def _add(
-        self, key: Any, excess: float, row: int, words: str, sample: Sample, *numbers: float
-    ) -> None:
-        self._worst[key] = excess, self._finding(row, words, sample, *numbers)
-
     def _finding(
         self, row: int, words: str, sample: Sample | None, error: float, tolerance: float
     ) -> Finding:
@@ -145,11 +140,6 @@ class Comparison:
         return Finding(
             self.check, self.subject.variant, self.kernel, row, words, error, tolerance, pose
         )
-
-
-def left_out(check: str, subject: SampledType, why: str) -> CheckOutcome:
-    """The outcome of a check that does not apply."""
-    return CheckOutcome(check, subject.variant, LEFT_OUT, why)
 
 
 @attrs.frozen(eq=False)

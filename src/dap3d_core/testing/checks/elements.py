@@ -143,8 +143,7 @@ def grip(subject: SampledType) -> CheckOutcome:
     c = Comparison("grip", subject, "grip", "coefficients are not negative; those of slow slip")
     for sample in subject.samples:
         mu = sample.value("tension")[-4:]
-        slow = attrs.evolve(sample.state, v=SLOW * sample.state.v, w=SLOW * sample.state.w)
-        near = sample.value("tension", slow)[-4:]
+        near = sample.value("tension", sample.state.at_speed(SLOW))[-4:]
         c.compare(sample, np.minimum(mu, 0.0), 0.0, _DRIVES)
         c.compare(sample, np.where(mu[::2] == 0.0, mu[1::2], 0.0), 0.0, _NONE)
         c.compare(sample, near[:2], near[2:], _JUMPS, tolerance=CONTINUOUS)

@@ -351,5 +351,4 @@ def against_ground(subject: SampledType) -> str:
 
 
 def _velocities(sample: Sample) -> Floats:
-    count = len(sample.kernels.type_info.layout.slots)
-    return np.hstack([sample.state.v, sample.state.w])[1 : count + 1]
+    return sample.state.velocities(len(sample.kernels.type_info.layout.slots))

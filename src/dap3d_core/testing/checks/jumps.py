@@ -251,17 +251,12 @@ def _inertia(state: State, b: int) -> Floats:
 
 def _in_motion(subject: SampledType) -> list[tuple[Sample, State]]:
     """The samples with their states at several speeds."""
-    return [
-        (sample, attrs.evolve(sample.state, v=s * sample.state.v, w=s * sample.state.w))
-        for sample in subject.samples
-        for s in SPEEDS
-    ]
+    return [(sample, sample.state.at_speed(s)) for sample in subject.samples for s in SPEEDS]
 
 
 def _rates(J: Floats, state: State) -> Floats:
     """(rows,) J v."""
-    v = np.concatenate([state.v, state.w], axis=1)[1 : len(J) + 1]
-    return np.einsum("src,sc->r", J, v)
+    return np.einsum("src,sc->r", J, state.velocities(len(J)))
 
 
 def _after(J: Floats, change: Floats, state: State) -> State | None:
@@ -277,7 +272,4 @@ def _after(J: Floats, change: Floats, state: State) -> State | None:
     if np.linalg.cond(K) > 1.0 / RATE_ROUNDING:
         return None
     dv = np.einsum("src,r->sc", of_impulse, np.linalg.solve(K, change))
-    v, w = state.v.copy(), state.w.copy()
-    v[1 : len(J) + 1] += dv[:, :3]
-    w[1 : len(J) + 1] += dv[:, 3:]
-    return attrs.evolve(state, v=v, w=w)
+    return state.with_velocity(state.velocities(len(J)) + dv)

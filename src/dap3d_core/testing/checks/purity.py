@@ -18,8 +18,8 @@ from dap3d_core.interface.examine.examine import ATTEMPTS
 from dap3d_core.interface.examine.random_values import random_quantity
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.kernels.runtime.source_digest import codes_in, reached
-from dap3d_core.testing.checks.compare import Comparison, left_out
-from dap3d_core.testing.checks.findings import CheckOutcome
+from dap3d_core.testing.checks.compare import Comparison
+from dap3d_core.testing.checks.findings import LEFT_OUT, CheckOutcome
 from dap3d_core.testing.samples.complex_step import Stepped
 from dap3d_core.testing.samples.sampled_type import UNDEFINED, Sample, SampledType, UndefinedError
 
@@ -87,7 +87,8 @@ def _names(subject: SampledType) -> tuple[str, ...]:
 def compiled(subject: SampledType) -> CheckOutcome:
     """Compiled kernels return the numbers of plain Python."""
     if not jit_is_on():
-        return left_out("compiled", subject, "nothing is compiled (DAP3D_PLAIN)")
+        words = "nothing is compiled (DAP3D_PLAIN)"
+        return CheckOutcome("compiled", subject.variant, LEFT_OUT, words)
     c = Comparison("compiled", subject, "", "compiled numbers against those of plain Python")
     for kind in LOOP_KINDS:
         owner = subject.friction if kind == "friction" and _has_friction(subject) else subject
@@ -144,18 +145,13 @@ def _about(function: Any, step: dis.Instruction) -> str:
     if step.opname in ("IMPORT_NAME", "IMPORT_FROM"):
         return f"it imports {name}; import at the top of the file"
     if step.opname == "LOAD_GLOBAL":
-        return _about_global(name, function.__globals__)
+        if name in function.__globals__:
+            return _about_value(name, function.__globals__[name])
+        is_impure = name in IMPURE_BUILTINS and hasattr(builtins, name)
+        return f"it calls {name}()" if is_impure else ""
     if step.opname == "LOAD_DEREF" and name in function.__code__.co_freevars:
         cells = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
         return _about_value(name, cells[name].cell_contents)
-    return ""
-
-
-def _about_global(name: str, names: dict[str, Any]) -> str:
-    if name in names:
-        return _about_value(name, names[name])
-    if name in IMPURE_BUILTINS and hasattr(builtins, name):
-        return f"it calls {name}()"
     return ""
 
 

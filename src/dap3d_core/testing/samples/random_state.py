@@ -170,6 +170,14 @@ class State:
         """The same pose without velocities."""
         return attrs.evolve(self, v=np.zeros((BODIES, 3)), w=np.zeros((BODIES, 3)))
 
+    def velocities(self, slots: int) -> Floats:
+        """(slots, 6) velocities and angular velocities of the bodies, without ground."""
+        return np.hstack([self.v, self.w])[1 : slots + 1]
+
+    def at_speed(self, factor: float) -> "State":
+        """The same pose with so many times the velocities."""
+        return attrs.evolve(self, v=factor * self.v, w=factor * self.w)
+
     def with_velocity(self, x: Floats) -> "State":
         """The same pose with velocities (slots, 6) of the bodies."""
         v, w = self.v.copy(), self.w.copy()

@@ -268,15 +268,21 @@ def test_they_are_written_and_copied():
     assert copy.requires == {"dap3d-example": ">=0.1", "dap3d": "*"}
 
 
-def scene_with(**combinations):
-    """A body that a force pushes by the function ``all``; combinations: name -> (type, terms)."""
-    scene = dap.Scene(name="combined")
+def block_pushed(**fields):
+    """A body that a force pushes, and a harmonic function."""
+    scene = dap.Scene(name="pushed")
     scene.add_body("block", mass=2.0, Jp=(1.0, 1.0, 1.0))
     scene.add_function("harmonic", "swing", frequency=3.0)
+    scene.add_force("f", "push", body_i="block", f=(1.0, 0.0, 0.0), **fields)
+    return scene
+
+
+def scene_with(**combinations):
+    """A body that a force pushes by the function ``all``; combinations: name -> (type, terms)."""
+    scene = block_pushed(function="all")
     scene.add_function("a", "ramp", coeff=(0.0, 1.0, 0.0))
     for name, (type_, terms) in combinations.items():
         scene.add_function(type_, name, functions=terms)
-    scene.add_force("f", "push", body_i="block", f=(1.0, 0.0, 0.0), function="all")
     return scene
 
 
@@ -345,11 +351,8 @@ def test_combinations_that_multiply_are_refused():
 
 def scene_pushed(value=0.0, name="motor", **fields):
     """A body that a force pushes by an input, or by other fields."""
-    scene = dap.Scene(name="pushed")
-    scene.add_body("block", mass=2.0, Jp=(1.0, 1.0, 1.0))
-    scene.add_function("harmonic", "swing", frequency=3.0)
+    scene = block_pushed(**(fields or {"input": name}))
     scene.add_input(name, value)
-    scene.add_force("f", "push", body_i="block", f=(1.0, 0.0, 0.0), **(fields or {"input": name}))
     return scene
 
 
