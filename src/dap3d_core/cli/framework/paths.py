@@ -78,7 +78,9 @@ def writable(
     if is_stdout:
         raise Refused(f"{path} is the standard output of this command; name another file with -o")
     if not os.access(target.parent, os.W_OK | os.X_OK):
-        raise Refused(f"cannot write {path}: no permission to write in its folder; name another with -o")
+        raise Refused(
+            f"cannot write {path}: no permission to write in its folder; name another with -o"
+        )
     return path
 
 
