@@ -127,7 +127,7 @@ def add_error(
     steps = second.stats.steps
     result.arrays = result.arrays.with_error(estimated_error(result.u, second.u, steps))
     by = f"by a second run at {words} ({steps:,} steps)"
-    note = information(f"the error of the result is estimated {by}")
+    note = information(f"the error is estimated {by}")
     _amend(result, output, note, *_divergence_note(result))
 
 
