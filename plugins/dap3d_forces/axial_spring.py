@@ -35,14 +35,15 @@ class AxialSpring(Force):
     keyword = "tran_sda"
     actuates = "f_a"
     joint: str = joint_fields(
-        "P_i", "P_j", "a_j", acts_in="length", doc="the joint in whose coordinate it acts"
-    )
+        "P_i", "P_j", "a_j", acts_in="length",
+        doc="the joint along which it acts; its length is 0 in the poses of the scene, x is not",
+    )  # fmt: skip
     P_i: Point = point(doc="where the force acts, on body i")
     P_j: Point = point(doc="point from which x is measured, on body j")
     a_j: Vector = vector(doc="axis, on body j")
     k: float = number(default=0.0, unit="N/m", usual=(0.0, None), doc="stiffness")
     c: float = number(default=0.0, unit="N s/m", usual=(0.0, None), doc="damping coefficient")
-    x_0: float = number(default=0.0, unit="m", doc="x without force of the spring")
+    x_0: float = number(default=0.0, unit="m", doc="distance x without force of the spring")
     f_a: float = number(default=0.0, unit="N", doc="force of the actuator; x grows by it")
     input: str = input_(doc="factor of f_a, an input")
     function: str = function(argument="x - x_0", doc="force, N, in place of k (x - x_0)")
