@@ -15,6 +15,7 @@ from typing import Any, NoReturn
 
 from dap3d_core.kernels.compiler import types as t
 from dap3d_core.kernels.compiler.expressions import Expressions
+from dap3d_core.kernels.syntax import parse
 
 
 class Program:
@@ -275,7 +276,7 @@ class FunctionCompiler(Expressions):
 @cache
 def _definitions(file: str, everywhere: bool) -> dict[int, ast.FunctionDef]:
     """Functions of a file by their first line, decorators included."""
-    tree = ast.parse("".join(linecache.getlines(file)))
+    tree = parse("".join(linecache.getlines(file)))
     nodes = ast.walk(tree) if everywhere else tree.body
     found = (node for node in nodes if isinstance(node, ast.FunctionDef))
     return {min([d.lineno for d in node.decorator_list] + [node.lineno]): node for node in found}

@@ -9,7 +9,6 @@ syntax only numbers, names, arithmetic, comparisons and calls of ``WORDS`` are a
 import ast
 import keyword
 import math
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from functools import reduce
 from typing import Any, Final, NamedTuple
@@ -18,6 +17,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.syntax import parse
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene.coerce import canonical
 from dap3d_core.scene.expressions.units import (
@@ -215,10 +215,8 @@ def parse_expression(text: str) -> Expression:
     if "\\" in text:
         raise ExpressionError("has a backslash, which is in no expression", ALLOWED)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of Python's reader, such as for "1if"
-            source = f"({text}\n)"
-            body = ast.parse(source, mode="eval").body
+        source = f"({text}\n)"
+        body = parse(source, "eval").body
         if not text.isascii():
             _restore_names(body, source)
         root = _node(body, DEEPEST)

@@ -9,6 +9,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from dap3d_core.kernels.syntax import parse
+
 if TYPE_CHECKING:
     from dap3d_core.scene import ValidatedScene
 
@@ -107,7 +109,7 @@ def digest_of(type_: Any) -> str:
 def _code_of(content: bytes) -> bytes:
     """The content of a source file without what changes no formula; of another file, all of it."""
     try:
-        tree = ast.parse(content)
+        tree = parse(content)
     except (SyntaxError, ValueError):
         return content
     _keep_formulas(tree)
