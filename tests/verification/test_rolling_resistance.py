@@ -86,6 +86,17 @@ def test_work_of_an_impact_is_what_it_takes_of_kinetic_energy():
     assert impact.work < 0.0
 
 
+def test_what_hardly_spins_in_the_air_spins_on():
+    """Rates as slow are stopped where something presses: not at a contact that is open."""
+    scene = ball(True, v=0.0, mu_spin=0.001, e=0.5)
+    scene.bodies["ball"].r = (0.0, 0.0, R + 0.01)
+    scene.add_body("other", mass=M, Jp=[I] * 3, r=[5.0, 0.0, 5.0], w=[0.0, 0.0, 1e-10])
+    scene.add_contact("ball_plane", P_i="other.O", radius=R, material="felt")
+    result = by_events(scene, 0.2)
+    assert any(event.kind == "impact" for event in result.events)
+    assert np.all(result.w[:, 1, 2] == 1e-10)
+
+
 def instants(result, name):
     """Where one sticks, by its name."""
     return [event.t for event in result.events if (event.kind, event.name) == ("stick", name)]

@@ -3,7 +3,7 @@
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
-from dap3d_core.assembly.evaluate import largest, zero
+from dap3d_core.assembly.evaluate import copy, largest, zero
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.contacts.forces import (
     ZERO,
@@ -294,8 +294,7 @@ def solve_without(s: ContactArrays) -> bool:
         return solve_forces(s, 1.0, False)
     if not hold_inside(s, True):
         return slip_sharing(s, True, 1.0)
-    for k in range(3 * s.closed_count):
-        s.cone.x[k] = s.inner[k]
+    copy(s.cone.x[: 3 * s.closed_count], s.inner)
     return True
 
 

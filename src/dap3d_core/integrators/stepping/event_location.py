@@ -232,8 +232,8 @@ def lowest_between(a: float, b: float, c: float, d: float, part: float, middle: 
     p2, p3 = 3.0 * (c - a) - 2.0 * b - d, b + d - 2.0 * (c - a)
     p4 = (middle - a - part * (b + part * (p2 + part * p3))) / weight
     between = 0.5 * (a + c) + (b - d) / 6.0 + p4 / 6.0
-    if min(a + 0.25 * b, c - 0.25 * d, between) > 0.5 * c:  # Bezier's points: clear of zero
-        return 1.0
+    if min(a + 0.25 * b, c - 0.25 * d, between) > 0.5 * c:
+        return 1.0  # Bezier's points are clear of zero, by more than the error below
     low, high, top, x = a, a, a, 0.0
     for k in range(1, PLACES + 1):
         value = quartic(a, b, p2, p3, p4, k / PLACES)
