@@ -167,7 +167,7 @@ class BodyCoordinates(Coordinates):
         poses = [*(f"r.{a}" for a in axes), *(f"p.e{k}" for k in range(4))]
         rates = [*(f"rd.{a}" for a in axes), *(f"wp.{a}" for a in axes)]
         names = [f"{b}.{q}" for part in (poses, rates) for b in model.body_names for q in part]
-        return [*names, *(label for s in model.element_states for label in s.labels)]
+        return [*names, *model.state_labels]
 
     def structure(self) -> tuple[str, str]:
         """As of ``Coordinates``."""

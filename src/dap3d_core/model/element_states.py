@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dap3d_core.interface.codegen.instance_layout import size
 from dap3d_core.interface.element_states import INITIAL, TOLERANCE
@@ -22,10 +23,25 @@ class ElementState(NamedTuple):
     @property
     def labels(self) -> tuple[str, ...]:
         """Name of each of its numbers: forces.spring.z, or forces.spring.z.1."""
-        name = f"{self.kind}s.{self.element}.{self.name}"
+        name = f"{self.kind}s.{self.path}"
         if self.length == 1:
             return (name,)
         return tuple(f"{name}.{k + 1}" for k in range(self.length))
+
+    @property
+    def path(self) -> str:
+        """The names of element and state: spring.z."""
+        return f"{self.element}.{self.name}"
+
+    @property
+    def places(self) -> slice:
+        """Its numbers among those of all states."""
+        return slice(self.first, self.first + self.length)
+
+
+def paths_where(states: Sequence[ElementState], chosen: NDArray[np.bool_]) -> list[str]:
+    """Paths of the states of which a number at least is chosen."""
+    return [state.path for state in states if np.any(chosen[state.places])]
 
 
 def width_of(group: Group) -> int:

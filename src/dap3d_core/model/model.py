@@ -205,6 +205,11 @@ class Model:
 
         return states_of(self.acting, {"joint": self.joint_names, "force": self.force_names})
 
+    @property
+    def state_labels(self) -> list[str]:
+        """(states,) names of the numbers of these."""
+        return [label for state in self.element_states for label in state.labels]
+
     @cached_property
     def initial_states(self) -> Floats:
         """(states,) initial values of the states of elements."""

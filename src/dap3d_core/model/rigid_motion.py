@@ -39,6 +39,11 @@ def quaternion_product(a: Floats, b: Floats) -> Floats:
     return product
 
 
+def conjugate(p: Floats) -> Floats:
+    """Euler parameters (..., 4) of the inverse rotations."""
+    return p * np.array([1.0, -1.0, -1.0, -1.0])
+
+
 def turned(p: Floats, a: Floats) -> Floats:
     """Vectors A a (..., 3) of unit Euler parameters p (..., 4)."""
     e = p[..., 1:]
@@ -72,7 +77,7 @@ def compose(a: Pose, b: Pose) -> Pose:
 
 def inverse(a: Pose) -> Pose:
     """The poses of the outer frames in the inner ones."""
-    p = a.p * np.array([1.0, -1.0, -1.0, -1.0])
+    p = conjugate(a.p)
     return Pose(-turned(p, a.r), p)
 
 

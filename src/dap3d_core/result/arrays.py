@@ -137,7 +137,7 @@ def summary_of(model: Model) -> ModelSummary:
         and all(len(slots) > 1 and 0 not in slots for slots in model.joint_slots),
         angle_count=model.angle_count,
         angle_names=model.angle_names,
-        state_names=tuple(name for state in model.element_states for name in state.labels),
+        state_names=tuple(model.state_labels),
         input_names=model.input_names,
     )
 

@@ -22,7 +22,7 @@ from dap3d_core.assembly.motion.joint_motion import (
 from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.linear.ordering.spanning_forest import SpanningForest
 from dap3d_core.model import Model
-from dap3d_core.model.rigid_motion import Pose, adjoint, quaternion_product, relative
+from dap3d_core.model.rigid_motion import Pose, adjoint, conjugate, quaternion_product, relative
 from dap3d_core.model.rotations import to_body, to_global
 from dap3d_core.model.state_layout import Layout, split, tree_layout
 
@@ -232,7 +232,7 @@ class Reference:
         p, p_parent = self.p[self.nodes.frame], self.p[self.nodes.frame[parent]]
         turning, sliding = motion == node.REVOLUTE, motion == node.PRISMATIC
         constants = np.zeros((len(table), node.CONSTANT_WIDTH))
-        turn = quaternion_product(p_parent * np.array([1.0, -1.0, -1.0, -1.0]), p)
+        turn = quaternion_product(conjugate(p_parent), p)
         own_axis = to_body(p, self.axis)
         back = np.where(turning, -0.5 * ANGLE, 0.0)[:, None]
         turn = quaternion_product(turn, np.hstack([np.cos(back), np.sin(back) * own_axis]))

@@ -254,30 +254,23 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
     kernels = {f"{name}__": kernel for name, kernel in declared.items()}
     every: dict[str, Any] = kernels | {"rate_of__": rates.rate_of, "turned__": rates.turned}
 
-    def bound(kernel: Callable[..., Any]) -> Any:
-        own = parameters(kernel)
-        given = {n: calls[n] for n in own if n in calls}
-        needed = dict.fromkeys(n for short in given for n in wanted.get(short, ()))
-        return bound_kernel(kernel, given, needed, every)
-
-    special: dict[str, Any] = rows.TURNING if "at" not in declared else {}
     if class_.load:
         how = class_.resists or ("push" if class_.pushes else "")
-        special = loaded.kernels_of(calls, wanted, every, how=how, has_j=has_j)
+        table: Any = loaded.kernels_of(calls, wanted, every, how=how)
     elif "along" in declared:
-        special = grips.KERNELS if "at" in declared else grips.TURNING
-    if special:
-        return {name: bound(kernel) for name, kernel in special.items()}
-    ends = "reach" in declared
-    return {
-        "C": bound(rows.position_within if ends else rows.position),
-        "J": bound(rows.blocks if has_j else rows.block),
-        "gamma": bound(rows.gamma),
-        "friction": bound(rows.friction if has_j else rows.friction_of_one),
-        "switch": bound(rows.switch_within if ends else rows.switch),
-        "rate": rows.rate,
-        "tension": bound(rows.output_with_law if "grip" in declared else rows.output),
-    }
+        table = grips.KERNELS if "at" in declared else grips.TURNING
+    else:
+        table = rows.KERNELS if "at" in declared else rows.TURNING
+        for name, kernels in rows.KERNELS_WITH.items():
+            table = table | (kernels if name in declared else {})
+
+    def bound(name: str, kernel: Callable[..., Any]) -> Any:
+        given = {n: calls[n] for n in parameters(kernel) if n in calls}
+        needed = dict.fromkeys(n for short in given for n in wanted.get(short, ()))
+        part = "[0]" if name in ("J", "friction") and not has_j else ""  # that of body i
+        return bound_kernel(kernel, given, needed, every, f"return {{}}{part}")
+
+    return {name: bound(name, kernel) for name, kernel in table.items()}
 
 
 def _expressions(

@@ -160,20 +160,10 @@ def blocks(axes, c, r_i, r_j, mode, way):
     )
 
 
-def block(axes, c, r_i, mode, way):
-    """J of a contact of one body with ground."""
-    return blocks(axes, c, r_i, _ZERO, mode, way)[0]
-
-
 def turning_blocks(axes, mode, way):
     """J of both bodies."""
     on = holding(axes, mode, way)
     return tuple(row(_ZERO, e) for e in on), tuple(row(_ZERO, neg(e)) for e in on)
-
-
-def turning_block(axes, mode, way):
-    """J of a contact of one body with ground."""
-    return turning_blocks(axes, mode, way)[0]
 
 
 def gamma(axes, axes_dot, u, c_dot, v_i, w_i, v_j, w_j, mode, way):
@@ -213,20 +203,10 @@ def friction(axes, ahead, c, r_i, r_j, load, mu, mode, near):
     return (F, cross(sub(c, r_i), F)), (neg(F), neg(cross(sub(c, r_j), F)))
 
 
-def friction_of_one(axes, ahead, c, r_i, load, mu, mode, near):
-    """The same of a contact of one body with ground."""
-    return friction(axes, ahead, c, r_i, _ZERO, load, mu, mode, near)[0]
-
-
 def turning_friction(axes, ahead, load, mu, mode, near):
     """What acts besides the rows."""
     M = besides(axes, ahead, load, mu, mode, near)
     return (_ZERO, M), (_ZERO, neg(M))
-
-
-def turning_friction_of_one(axes, ahead, load, mu, mode, near):
-    """The same of a contact of one body with ground."""
-    return turning_friction(axes, ahead, load, mu, mode, near)[0]
 
 
 def switch(axes, u, ahead, toward, lam, load, mu, mu_s, mode, way, near, unit_mass):
@@ -263,30 +243,24 @@ def resisting_output(axes, u, ahead, lam, load, mu, mu_s, mode, near):
 
 KERNELS = {"J": blocks, "gamma": gamma, "friction": friction, "switch": switch,
            "rate": rate, "tension": output}  # fmt: skip
-OF_ONE = KERNELS | {"J": block, "friction": friction_of_one}
 TURNING = {"J": turning_blocks, "gamma": turning_gamma, "rate": rate, "friction": turning_friction,
            "switch": switch, "tension": turning_output}  # fmt: skip
 RESISTING = TURNING | {"switch": resisting_switch, "tension": resisting_output}
-RESISTING_ON_ONE = RESISTING | {"J": turning_block, "friction": turning_friction_of_one}
 
 
 def kernels_of(
-    calls: dict[str, str], wanted: dict[str, list[str]], every: dict[str, Any],
-    *, how: str, has_j: bool,
-) -> dict[str, Any]:  # fmt: skip
+    calls: dict[str, str], wanted: dict[str, list[str]], every: dict[str, Any], *, how: str
+) -> dict[str, Any]:
     """The kernels of the friction of a joint.
 
     Args:
         calls, wanted: expressions, and the names that they take, to which those of here are added.
         every: functions that expressions call; as well.
         how: as of ``expressions``.
-        has_j: there are two bodies.
     """
     wanted |= needs(wanted, calls, how)
     calls |= expressions(calls, how)
     every |= FUNCTIONS
     if how in RESISTED:
-        return RESISTING if has_j else RESISTING_ON_ONE
-    if "c" not in calls:
-        return TURNING
-    return KERNELS if has_j else OF_ONE
+        return RESISTING
+    return KERNELS if "c" in calls else TURNING

@@ -9,6 +9,7 @@ has its rate. Branches are those of the values.
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
 
 import math
+import operator
 from collections.abc import Callable
 from typing import Any
 
@@ -39,49 +40,36 @@ class _RateFunctions:
         (v, g), (w, h) = _parts(a), _parts(b)
         return Rate(where(condition.value, v, w), where(condition.value, g, h))
 
-    def sqrt(self, x):
-        """The square root."""
-        root = sqrt(x.value)
-        return Rate(root, 0.5 * x.rate / root)
-
-    def sin(self, x):
-        """The sine."""
-        return Rate(sin(x.value), cos(x.value) * x.rate)
-
-    def cos(self, x):
-        """The cosine."""
-        return Rate(cos(x.value), -sin(x.value) * x.rate)
-
-    def tan(self, x):
-        """The tangent."""
-        value = tan(x.value)
-        return Rate(value, (1.0 + value * value) * x.rate)
-
-    def atan(self, x):
-        """The angle of a tangent."""
-        return Rate(atan(x.value), x.rate / (1.0 + x.value * x.value))
-
     def atan2(self, y, x):
         """The angle of a point (x, y)."""
         (v, g), (w, h) = _parts(y), _parts(x)
         return Rate(atan2(v, w), (w * g - v * h) / (v * v + w * w))
 
-    def asin(self, x):
-        """The angle of a sine."""
-        return Rate(asin(x.value), x.rate / sqrt(1.0 - x.value * x.value))
 
-    def acos(self, x):
-        """The angle of a cosine."""
-        return Rate(acos(x.value), -x.rate / sqrt(1.0 - x.value * x.value))
+#: Functions of one number x, and the rate of their value y from that of x, g.
+_CHAIN = {
+    sqrt: lambda x, g, y: 0.5 * g / y,
+    sin: lambda x, g, y: cos(x) * g,
+    cos: lambda x, g, y: -sin(x) * g,
+    tan: lambda x, g, y: (1.0 + y * y) * g,
+    atan: lambda x, g, y: g / (1.0 + x * x),
+    asin: lambda x, g, y: g / sqrt(1.0 - x * x),
+    acos: lambda x, g, y: -g / sqrt(1.0 - x * x),
+    exp: lambda x, g, y: y * g,
+    log: lambda x, g, y: g / x,
+}
 
-    def exp(self, x):
-        """The exponential."""
-        value = exp(x.value)
-        return Rate(value, value * x.rate)
 
-    def log(self, x):
-        """The natural logarithm."""
-        return Rate(log(x.value), x.rate / x.value)
+def _add(function, chain):
+    def with_rate(self, x):
+        value = function(x.value)
+        return Rate(value, chain(x.value, x.rate, value))
+
+    setattr(_RateFunctions, function.__name__, with_rate)
+
+
+for _function, _rate in _CHAIN.items():
+    _add(_function, _rate)
 
 
 class _Condition:
@@ -154,17 +142,13 @@ class Rate:
     def __pow__(self, n):
         return Rate(self.value**n, n * self.value ** (n - 1) * self.rate)
 
-    def __lt__(self, other):
-        return _Condition(self.value < _parts(other)[0])
 
-    def __le__(self, other):
-        return _Condition(self.value <= _parts(other)[0])
+def _compare(operation):
+    return lambda self, other: _Condition(operation(self.value, _parts(other)[0]))
 
-    def __gt__(self, other):
-        return _Condition(self.value > _parts(other)[0])
 
-    def __ge__(self, other):
-        return _Condition(self.value >= _parts(other)[0])
+for _name in ("lt", "le", "gt", "ge"):
+    setattr(Rate, f"__{_name}__", _compare(getattr(operator, _name)))
 
 
 def rate_of(function: Callable[..., Any], values: tuple[Any, ...], rates: tuple[Any, ...]) -> Any:

@@ -129,11 +129,6 @@ def blocks(c, n, grain, r_i, r_j, mode, way):
     )
 
 
-def block(c, n, grain, r_i, mode, way):
-    """J of a contact of one body with ground."""
-    return blocks(c, n, grain, r_i, _ZERO, mode, way)[0]
-
-
 def slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j):
     """Velocity at the point of contact of body i less that of body j."""
     of_i = add(v_i, cross(w_i, sub(c, r_i)))
@@ -225,12 +220,6 @@ def friction(c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, mode, way, ne
         (force, cross(sub(c, r_i), force)),
         (neg(force), neg(cross(sub(c, r_j), force))),
     )
-
-
-def friction_of_one(c, n, grain, r_i, v_i, w_i, lam, grip, mode, way, near):
-    """The same of a contact of one body with ground."""
-    other = _ZERO, _ZERO, _ZERO
-    return friction(c, n, grain, r_i, v_i, w_i, *other, lam, grip, mode, way, near)[0]
 
 
 def switch(
@@ -338,6 +327,13 @@ def turning_output(gap, n, lam, mode, near):
     return (gap, moment(n, lam, mode, near), *_ZERO, *_ZERO, *_ZERO, 1.0, *_ZERO)
 
 
+KERNELS = {"C": position, "J": blocks, "gamma": gamma, "friction": friction, "switch": switch,
+           "rate": rate, "tension": output}  # fmt: skip
+#: Those in their place, by what a type of contact declares.
+KERNELS_WITH = {
+    "reach": {"C": position_within, "switch": switch_within},
+    "grip": {"tension": output_with_law},
+}
 #: Of a contact whose gap is an angle: one row, of a moment about its normal. The two rows across
 #: stay zero, as those of a contact that slides.
 TURNING = {"C": position, "J": turning_blocks, "gamma": turning_gamma, "rate": rate,

@@ -165,8 +165,7 @@ class ParameterStatics:
             self._first = pose.u
         refuse_carried(self.evaluator, self._first, pose.u)
         if moving := moving_states(self.evaluator, pose.u):
-            names = ", ".join(f"{state.element}.{state.name}" for state in moving)
-            raise SimulationError(f"a path cannot be followed: the rate of {names} vanishes for no "
+            raise SimulationError(f"a path cannot be followed: the rate of {moving} vanishes for no "
                                   "value of the state at a pose")  # fmt: skip
 
     def corrected(

@@ -79,8 +79,7 @@ class Equilibrium:
         model = self.compiled.model
         angles = dict(zip(model.angle_names, self.angles.tolist(), strict=True))
         note = information("the start is an equilibrium")
-        names = [name for state in model.element_states for name in state.labels]
-        states = dict(zip(names, self.states.tolist(), strict=True))
+        states = dict(zip(model.state_labels, self.states.tolist(), strict=True))
         return NamedState(str(self.compiled.scene.name) or "the equilibrium", model.body_names,
                           self.u, angles, (note,), states=states)  # fmt: skip
 
@@ -129,7 +128,7 @@ class Equilibrium:
         for state in self.compiled.model.element_states:
             if state.element in contacts:
                 continue  # a run finds the modes of contacts itself
-            values = self.states[state.first : state.first + state.length].tolist()
+            values = self.states[state.places].tolist()
             element = getattr(scene, f"{state.kind}s")[state.element]
             element.fields[f"{state.name}_0"] = values[0] if state.length == 1 else tuple(values)
         scene.simulation.start = "scene"

@@ -212,8 +212,7 @@ def _with_states(evaluator: Evaluator, search: Search, u: Floats) -> Search:
     statics.settles = False
     found = solve_coupled(statics, search.pose)
     if found is None:
-        names = ", ".join(f"{state.element}.{state.name}" for state in moving)
-        raise SimulationError(f"no equilibrium: the rate of {names} vanishes neither for any "
+        raise SimulationError(f"no equilibrium: the rate of {moving} vanishes neither for any "
                               "value of the state nor at another pose")  # fmt: skip
     return attrs.evolve(search, pose=found, outcome=Outcome.BALANCED)
 

@@ -20,7 +20,8 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.function_lists import call_loop
 from dap3d_core.linear.rank.rank import tolerance_of
-from dap3d_core.model.element_states import ElementState, first_states, width_of
+from dap3d_core.model.element_states import first_states, paths_where, width_of
+from dap3d_core.model.rigid_motion import conjugate, quaternion_product, rotation_vector
 from dap3d_core.model.state_layout import split
 from dap3d_core.simulation.errors import AssemblyError, SimulationError
 from dap3d_core.simulation.initial.assemble import fit_of, weights_of
@@ -226,14 +227,7 @@ def displacement(u: Floats, other: Floats) -> tuple[Floats, Floats]:
     """Displacements, m, and rotation vectors, rad, global axes, (n, 3), from a state to another."""
     r, p, _, _ = split(u)
     s, q, _, _ = split(other)
-    e0, e = p[:, :1], p[:, 1:]
-    f0, f = q[:, :1], q[:, 1:]
-    cosine = e0 * f0 + np.sum(e * f, axis=1, keepdims=True)
-    sine = np.where(cosine < 0.0, -1.0, 1.0) * (e0 * f - f0 * e - np.cross(f, e))
-    length = np.linalg.norm(sine, axis=1, keepdims=True)
-    angle = 2.0 * np.arctan2(length, np.abs(cosine))
-    factor = np.where(length > 0.0, angle / np.where(length > 0.0, length, 1.0), 2.0)
-    return s - r, factor * sine
+    return s - r, rotation_vector(quaternion_product(q, conjugate(p)))
 
 
 def settle(evaluator: Evaluator, t: float, u: Floats) -> None:
@@ -252,12 +246,11 @@ def settle(evaluator: Evaluator, t: float, u: Floats) -> None:
         evaluator.states = best - _inverse(evaluator, own.rate_by_states) @ own.rates
 
 
-def moving_states(evaluator: Evaluator, u: Floats) -> list[ElementState]:
-    """The states that do not come to rest at a pose."""
+def moving_states(evaluator: Evaluator, u: Floats) -> str:
+    """Names of the states that do not come to rest at a pose; "" where all do."""
     own = _derivatives(evaluator, 0.0, u)
     moves = np.abs(own.rates) > 1e3 * SETTLED * _terms(own, evaluator.states)
-    return [s for s in evaluator.model.element_states
-            if np.any(moves[s.first : s.first + s.length])]  # fmt: skip
+    return ", ".join(paths_where(evaluator.model.element_states, moves))
 
 
 def refuse_carried(evaluator: Evaluator, u: Floats, other: Floats) -> None:
@@ -283,9 +276,7 @@ def refuse_carried(evaluator: Evaluator, u: Floats, other: Floats) -> None:
             f"no equilibrium: {', '.join(underway)} moves bodies to another position. Let the "
             "motion come to rest (simulate), and start at its end (start=result)"
         )
-    carried = [f"{state.element}.{state.name}" for state in evaluator.model.element_states
-               if np.any(moves[state.first : state.first + state.length])]  # fmt: skip
-    if carried:
+    if carried := paths_where(evaluator.model.element_states, moves):
         raise SimulationError(
             f"statics does not know {', '.join(carried)} where forces balance: no pose decides "
             "such a state, it keeps the way of the motion there. Let a damped motion come to rest "

@@ -198,9 +198,8 @@ class Jumps:
         """States of elements that a jump has changed: element -> state -> value."""
         changed: dict[str, dict[str, Any]] = {}
         for state in self._evaluator.model.element_states:
-            place = slice(state.first, state.first + state.length)
-            if not np.array_equal(before[place], after[place]):
-                value = after[place].tolist()
+            value = after[state.places].tolist()
+            if before[state.places].tolist() != value:
                 value = value[0] if state.length == 1 else value
                 changed.setdefault(state.element, {})[state.name] = value
         return changed

@@ -162,7 +162,7 @@ def _worst_state(evaluator: Evaluator, values: Floats) -> str:
     """Name of the state of an element with the largest of some numbers, or one not finite."""
     worst = int(np.argmax(np.where(np.isfinite(values), np.abs(values), np.inf)))
     for state in evaluator.model.element_states:
-        if state.first <= worst < state.first + state.length:
+        if worst in range(state.first, state.first + state.length):
             return f"{state.name} of {state.kind} {state.element}"
     return ""
 

@@ -147,7 +147,7 @@ def _matched(named: NamedState, model: Model, scene: Scene) -> StartState:
         listed = some(uncounted, MOST_NAMES)
         notes.append(f"turns are counted from zero, for the start has none: {listed}")
     angles = np.array([named.angles.get(name, 0.0) for name in names]) if names else None
-    labels = [label for state in model.element_states for label in state.labels]
+    labels = model.state_labels
     if missing := sorted({n.rpartition(".")[0] for n in labels if n not in named.states}):
         listed = some(missing, MOST_NAMES)
         notes.append(f"states begin with their initial values, for the start has none of {listed}")

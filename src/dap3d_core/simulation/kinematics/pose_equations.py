@@ -169,8 +169,8 @@ def required_forces(evaluator: Evaluator, t: float, u: Floats, v_dot: Floats) ->
 
 def held_states(model: Model) -> list[str]:
     """Note that states of elements stay as they are; none where there are no states."""
-    own = [state for state in model.element_states if state.element not in model.contact_names]
+    own = [s.path for s in model.element_states if s.element not in model.contact_names]
     if not own:
         return []
-    names = ", ".join(f"{state.element}.{state.name}" for state in own)
+    names = ", ".join(own)
     return [f"no motion is integrated: states of elements keep their initial values ({names})"]

@@ -173,8 +173,7 @@ class Linearization:
     @property
     def element_states(self) -> tuple[str, ...]:
         """Names of the states of elements, the last among the states: ``spring.z``."""
-        states = self._point.model.element_states
-        names = [name.partition(".")[2] for state in states for name in state.labels]
+        names = [label.partition(".")[2] for label in self._point.model.state_labels]
         return tuple(names[k] for k in self._point.kept)
 
     @property

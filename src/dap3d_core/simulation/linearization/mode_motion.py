@@ -5,6 +5,7 @@ from contextlib import suppress
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.model.rigid_motion import quaternion_product
 from dap3d_core.model.state_layout import join, split, velocities_of
 from dap3d_core.result import Result, RunMetadata, information
 from dap3d_core.simulation.errors import AssemblyError
@@ -26,9 +27,7 @@ def displaced_state(u: Floats, x: Floats, velocity: Floats) -> Floats:
     half = 0.5 * x[:, 3:]
     angle = np.linalg.norm(half, axis=1, keepdims=True)
     e0, e = np.cos(angle), np.sinc(angle / np.pi) * half
-    scalar = e0 * p[:, :1] - np.sum(e * p[:, 1:], axis=1, keepdims=True)
-    vector = e0 * p[:, 1:] + e * p[:, :1] + np.cross(e, p[:, 1:])
-    turned = np.hstack([scalar, vector])
+    turned = quaternion_product(np.hstack([e0, e]), p)
     return join(r + x[:, :3], turned, v + velocity[:, :3], w + velocity[:, 3:])
 
 

@@ -89,9 +89,9 @@ class OperatingPoint:
     def kept(self) -> Integers:
         """(k,) places of the states of elements that may change: those of contacts stay."""
         contacts = set(self.model.contact_names)
-        own = [s for s in self.model.element_states if s.element not in contacts]
-        places = [np.arange(s.first, s.first + s.length) for s in own]
-        return np.concatenate([np.zeros(0, dtype=np.int64), *places])
+        places = np.arange(self.model.state_count)
+        own = [places[s.places] for s in self.model.element_states if s.element not in contacts]
+        return np.concatenate([places[:0], *own])
 
     @cached_property
     def position_rank(self) -> int:

@@ -26,6 +26,7 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.loop_derivatives import LoopDerivatives, differentiate_loop
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.model import Group, Model
+from dap3d_core.model.element_states import paths_where
 from dap3d_core.model.rotations import rotation, skew
 from dap3d_core.model.state_layout import split, velocities_of
 from dap3d_core.registry.suggestions import some
@@ -151,9 +152,7 @@ def _check_states(model: Model, own: "StateDerivatives", t: float) -> None:
     wrong = ~np.isfinite(own.rates)
     for matrix in (own.rate_by_displacement, own.rate_by_velocity, own.rate_by_states):
         wrong |= ~np.isfinite(np.asarray(abs(matrix).sum(axis=1)).ravel())
-    names = [f"{s.element}.{s.name}" for s in model.element_states
-             if np.any(wrong[s.first : s.first + s.length])]  # fmt: skip
-    if names:
+    if names := paths_where(model.element_states, wrong):
         raise SimulationError(
             f"the rate of {', '.join(names[:MOST_NAMES])} has no derivative at t = {t:g} s: the "
             "equations cannot be linearised here; move the state off this point"
