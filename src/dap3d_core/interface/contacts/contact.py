@@ -256,13 +256,13 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
 
     if class_.load:
         how = class_.resists or ("push" if class_.pushes else "")
-        table: Any = loaded.kernels_of(calls, wanted, every, how=how)
+        table = loaded.kernels_of(calls, wanted, every, how=how)
     elif "along" in declared:
         table = grips.KERNELS if "at" in declared else grips.TURNING
     else:
-        table = rows.KERNELS if "at" in declared else rows.TURNING
-        for name, kernels in rows.KERNELS_WITH.items():
-            table = table | (kernels if name in declared else {})
+        table = dict[str, Any](rows.KERNELS if "at" in declared else rows.TURNING)
+        for name in rows.KERNELS_WITH.keys() & declared.keys():
+            table |= rows.KERNELS_WITH[name]
 
     def bound(name: str, kernel: Callable[..., Any]) -> Any:
         given = {n: calls[n] for n in parameters(kernel) if n in calls}

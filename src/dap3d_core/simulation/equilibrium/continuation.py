@@ -165,8 +165,8 @@ class ParameterStatics:
             self._first = pose.u
         refuse_carried(self.evaluator, self._first, pose.u)
         if moving := moving_states(self.evaluator, pose.u):
-            raise SimulationError(f"a path cannot be followed: the rate of {moving} vanishes for no "
-                                  "value of the state at a pose")  # fmt: skip
+            raise SimulationError(f"a path cannot be followed: the rate of {moving} vanishes for "
+                                  "no value of the state at a pose")  # fmt: skip
 
     def corrected(
         self, u: Floats, way: Floats, s: float, normal: Floats

@@ -424,17 +424,15 @@ def lowest_eigenvalues(
     identity = eye_array(six)
     on_x = D.multiply(position[:, None]) + G.multiply(~position[:, None])
     on_v = D.multiply(~position[:, None])
-    terms = [[equations.S, identity, None],
-                [-equations.K, -equations.C, D.T + F],
-                [on_x, on_v, None]]  # fmt: skip
+    own = equations.states
+    by_rows = own.position[chosen].multiply(position[:, None])
+    by_rows = by_rows + own.velocity[chosen].multiply(~position[:, None])
+    terms = [[equations.S, identity, None, None],
+             [-equations.K, -equations.C, D.T + F, own.force],
+             [on_x, on_v, None, by_rows],
+             [own.by_displacement, own.by_velocity, None, own.by_states]]  # fmt: skip
     masses = [identity, identity, csc_array((len(chosen), len(chosen)))]
-    if (own := equations.states) is not None:
-        by_rows = own.position[chosen].multiply(position[:, None])
-        by_rows = by_rows + own.velocity[chosen].multiply(~position[:, None])
-        for row, block in zip(terms, (None, own.force, by_rows), strict=True):
-            row.append(block)
-        terms.append([own.by_displacement, own.by_velocity, None, own.by_states])
-        masses.append(eye_array(own.by_states.shape[0]))
+    masses.append(eye_array(own.by_states.shape[0]))
     B, E = block_array(terms).tocsc(), block_diag(masses).tocsc()
     largest = max(np.sqrt(_norm(equations.K)), _norm(equations.C), _norm(equations.S))
     sigma = SHIFT * largest if largest > 0.0 else 1.0

@@ -80,10 +80,7 @@ class OperatingPoint:
     def equations(self) -> ScaledEquations:
         """The linearised equations, scaled."""
         found = scaled_equations(self.model, self.tangent, self.u, self.frames)
-        kept = self.kept
-        if found.states is None or kept.size == self.model.state_count:
-            return found
-        return attrs.evolve(found, states=found.states.of(kept) if kept.size else None)
+        return attrs.evolve(found, states=found.states.of(self.kept))
 
     @cached_property
     def kept(self) -> Integers:

@@ -26,7 +26,7 @@ from dap3d_core.simulation.linearization.steady_motion import SteadyFrames
 from dap3d_core.simulation.linearization.tangent import TangentMatrices
 
 
-@attrs.frozen(eq=False, kw_only=True)
+@attrs.frozen(eq=False)
 class ScaledStates:
     """The matrices Z above, as scipy CSR arrays.
 
@@ -67,7 +67,7 @@ class ScaledEquations:
         acceleration_by_displacement, acceleration_by_velocity: (rows, 6 n) of D a - gamma.
         gradient: (rows,) lengths of the rows of D before; multipliers are lambda gradient.
         position_row: (rows,) True where a row has a position level.
-        states: of elements; None where there are none.
+        states: of elements.
     """
 
     U: Any
@@ -81,7 +81,7 @@ class ScaledEquations:
     acceleration_by_velocity: Any
     gradient: Floats
     position_row: NDArray[np.bool_]
-    states: ScaledStates | None = None
+    states: ScaledStates
 
 
 def scaled_equations(
@@ -126,10 +126,14 @@ def scaled_equations(
     )
 
 
-def _scaled_states(tangent: TangentMatrices, U: Any, inverse: Any) -> ScaledStates | None:
+def _scaled_states(tangent: TangentMatrices, U: Any, inverse: Any) -> ScaledStates:
     own = tangent.states
     if own is None:
-        return None
+        from scipy.sparse import csr_array
+
+        by_six, none = csr_array((0, U.shape[0])), csr_array((0, 0))
+        rows = (csr_array((inverse.shape[0], 0)) for _ in range(3))
+        return ScaledStates(by_six, by_six, none, by_six.T, *rows)
     return ScaledStates(
         by_displacement=own.rate_by_displacement @ U,
         by_velocity=own.rate_by_velocity @ U,

@@ -92,7 +92,7 @@ def state_space(
     holonomic = rows if np.all(position) else _Rows(D[position], position_rank)
     Q = _extended(N, holonomic.null)
     moved = holonomic.pseudoinverse(nu[1][position])
-    own = _Own.of_equations(equations, len(U), len(D))
+    own = _Own(*(matrix.toarray() for matrix in attrs.astuple(equations.states, recurse=False)))
     shifted = -holonomic.pseudoinverse(own.position[position])
     x = np.hstack([Q, moved, np.zeros((len(U), N.shape[1] + count)), shifted])
     driven, followed = rows.pseudoinverse(nu[1]), -rows.pseudoinverse(own.velocity)
@@ -138,7 +138,7 @@ def _size(K: Floats, C: Floats, S: Floats, by_states: Floats) -> float:
 
 
 class _Own(ScaledStates):
-    """The same, dense; without columns where there are no states."""
+    """The same, dense."""
 
     @property
     def count(self) -> int:
@@ -149,18 +149,6 @@ class _Own(ScaledStates):
         """Rates (s, c) of the states, which are the last of c columns of displacements."""
         own = _placed(self.by_states, x.shape[1] - self.count, x.shape[1])
         return self.by_displacement @ x + self.by_velocity @ v + own
-
-    @classmethod
-    def of_equations(cls, equations: ScaledEquations, six: int, rows: int) -> "_Own":
-        """Of equations of ``six`` displacements and so many rows."""
-        names = [field.name for field in attrs.fields(cls)]
-        if equations.states is not None:
-            return cls(**{name: getattr(equations.states, name).toarray() for name in names})
-        shapes = dict.fromkeys(names, (rows, 0)) | {
-            "by_displacement": (0, six), "by_velocity": (0, six), "by_states": (0, 0),
-            "force": (six, 0),
-        }  # fmt: skip
-        return cls(**{name: np.zeros(shape) for name, shape in shapes.items()})
 
 
 def _extended(basis: Floats, wider: Floats) -> Floats:
