@@ -12,7 +12,7 @@ from dap3d_core.model import Model
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.rotations import read_only
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result.arrays import POINT, Arrays, ModelSummary, arrays_of, summary_of
+from dap3d_core.result.arrays import COLUMNS, POINT, Arrays, ModelSummary, arrays_of, summary_of
 from dap3d_core.result.display import ResultDisplay
 from dap3d_core.result.errors import ResultError, UnknownNameError, unknown
 from dap3d_core.result.event_record import EventRecord
@@ -75,6 +75,13 @@ def _motion(array: str) -> cached_property[Floats]:
     return cached_property(values)
 
 
+def _stored(array: str) -> Any:
+    """The attribute for a stored array."""
+    column = next(column for column in COLUMNS if column.name == array)
+    text = f"({', '.join(column.dimensions)}) {column.meaning}; unit {column.unit}."
+    return property(lambda result: getattr(result.arrays, array), doc=text)
+
+
 class Result(ResultDisplay, ResultContacts):
     """Result of a run: n bodies, m constraint rows, nP points at nt instants.
 
@@ -92,6 +99,13 @@ class Result(ResultDisplay, ResultContacts):
     summary: ModelSummary
     arrays: Arrays
     record: RunMetadata
+
+    t: Floats = _stored("t")
+    u: Floats = _stored("u")
+    v_dot: Floats = _stored("v_dot")
+    Lam: Floats = _stored("Lam")
+    work: Floats = _stored("work")
+    inputs: Floats = _stored("inputs")
 
     r = _motion("r")
     p = _motion("p")
@@ -164,36 +178,6 @@ class Result(ResultDisplay, ResultContacts):
         return _received, (self.summary, arrays, self.record)
 
     # ------------------------------------------------------------------ stored
-
-    @property
-    def t(self) -> Floats:
-        """(nt,) reported instants, s. T of the manual."""
-        return self.arrays.t
-
-    @property
-    def u(self) -> Floats:
-        """(nt, 13 n) states: r, p, then r_dot, omega of each body; uT of the manual."""
-        return self.arrays.u
-
-    @property
-    def v_dot(self) -> Floats:
-        """(nt, 6 n) accelerations: r_ddot (m/s^2), omega_dot (rad/s^2) of each body."""
-        return self.arrays.v_dot
-
-    @property
-    def Lam(self) -> Floats:
-        """(nt, m) Lagrange multipliers: D^T Lam are the reactions of the joints."""
-        return self.arrays.Lam
-
-    @property
-    def work(self) -> Floats:
-        """(nt,) work done on the system by forces and drivers since the start, J."""
-        return self.arrays.work
-
-    @property
-    def inputs(self) -> Floats:
-        """(nt, k) inputs of the scene, as they acted at each instant."""
-        return self.arrays.inputs
 
     @property
     def error(self) -> ErrorEstimate | None:

@@ -10,6 +10,7 @@ from dap3d_core.assembly.arrays import ENERGY, RATE, VALUE, WRENCH
 from dap3d_core.assembly.evaluate import call_kinds, place_state
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.model.rigid_motion import quaternion_product
 from dap3d_core.model.rotations import to_global
 from dap3d_core.model.state_layout import join, split, velocities_of, y_from_u
 
@@ -64,13 +65,7 @@ def _moved(r: Floats, p: Floats, v: Floats, w: Floats, h: float) -> tuple[Floats
     angle = np.linalg.norm(w, axis=1, keepdims=True)
     half = 0.5 * h * angle
     c, e = np.cos(half), np.sin(half) * w / np.where(angle > 0.0, angle, 1.0)
-    turned = np.hstack(
-        [
-            p[:, :1] * c - np.sum(p[:, 1:] * e, axis=1, keepdims=True),
-            p[:, :1] * e + c * p[:, 1:] + np.cross(p[:, 1:], e),
-        ]
-    )
-    return r + h * v, turned
+    return r + h * v, quaternion_product(p, np.hstack([c, e]))
 
 
 def _power(evaluator: Evaluator, u: Floats) -> tuple[float, float, Floats]:
