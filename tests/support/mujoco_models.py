@@ -2,6 +2,8 @@
 
 import numpy as np
 
+import dap3d_core as dap
+
 
 class Oracle:
     """A model that MuJoCo has read, without contacts, limits, friction and equalities."""
@@ -40,6 +42,27 @@ class Oracle:
             rates[name] = tuple(d.qvel[v : v + size])
         self.mujoco.mj_forward(m, d)
         return q, rates
+
+    def scene(self, path, rng):
+        """A file imported at a random state, with the controls and activations of this model."""
+        positions, rates = self.randomise(rng)
+        scene, report = dap.import_model(path, positions=positions, rates=rates, limits="off")
+        assert not [one for one in report.left_out if one.motion]
+        for value, one in zip(self.data.ctrl, scene.inputs.values(), strict=True):
+            one.value = float(value)
+        states = [one for one in scene.forces.values() if one.fields.get("activation")]
+        for value, one in zip(self.data.act, states, strict=True):
+            one.fields["z_0"] = float(value)
+        return scene
+
+    def check_accelerations(self, scene, names, atol):
+        """A run of the scene begins with the accelerations of bodies that MuJoCo has now."""
+        result = dap.simulate(scene, t_end=0.0)
+        for name in names:
+            b, k = self.model.body(name).id, list(scene.bodies).index(name)
+            found = np.concatenate([result.rdd[0, k], result.wd[0, k]])
+            expected = self.acceleration(b, self.group(b)[1])
+            np.testing.assert_allclose(found, expected, rtol=0, atol=atol, err_msg=name)
 
     def group(self, body):
         """Mass, mass centre, and inertia in the body's axes, of all that is fixed to a body."""
