@@ -8,8 +8,6 @@ from collections.abc import Mapping
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
-import attrs
-
 from dap3d_core.assembly.arrays import Floats
 from dap3d_core.formulations import PROJECT, RHS, WATCH
 from dap3d_core.formulations.evaluator import Evaluator
@@ -42,26 +40,6 @@ KINDS = {
 _LINE = re.compile(r"\s*(?:(%[\w.]+) = )?(.*)")
 
 
-@attrs.frozen
-class ProgramOperations:
-    """Operations of a program, without those that no result needs.
-
-    Attributes:
-        name: "right-hand side", "projection" with the right-hand side before it, or "switches".
-        parts: function -> kind of operation -> how many, the largest first.
-        guards: conditions that are tested, all at once.
-    """
-
-    name: str
-    parts: dict[str, dict[str, int]]
-    guards: int
-
-    @property
-    def total(self) -> dict[str, int]:
-        """Kind of operation -> how many in all."""
-        return {kind: sum(part[kind] for part in self.parts.values()) for kind in KINDS}
-
-
 class _Counting(StraightLine):
     """Notes which function of the core each instruction comes from."""
 
@@ -90,8 +68,14 @@ class _Counting(StraightLine):
         return "results"
 
 
-def operations(evaluator: Evaluator, time: float, state: Floats) -> list[ProgramOperations]:
+def operations(evaluator: Evaluator, time: float, state: Floats) -> list[dict[str, Any]]:
     """The operations of the programs of a scene, at a state as projections are given.
+
+    Those that no result needs do not count.
+
+    Returns:
+        of each program its ``name``; in ``parts`` function -> kind of operation -> how many, the
+        largest first; ``total``, kind -> how many in all; ``guards``, conditions that are tested.
 
     Raises:
         TraceError, CompileError: it has none; says why.
@@ -108,8 +92,10 @@ def operations(evaluator: Evaluator, time: float, state: Floats) -> list[Program
         tracer = _Counting(loops)
         text, _ = write_program(evaluator, k, time, state, names, tracer=tracer)
         body = text.partition("program:")[2].partition("general:")[0].splitlines()
-        counts = _counts(body, tracer.owner)
-        found.append(ProgramOperations(NAMES[k], counts, len(tracer.guards)))
+        parts = _counts(body, tracer.owner)
+        total = {kind: sum(part[kind] for part in parts.values()) for kind in KINDS}
+        guards = len(tracer.guards)
+        found.append({"name": NAMES[k], "guards": guards, "total": total, "parts": parts})
     return found
 
 
@@ -205,16 +191,9 @@ def _programs(compiled: "CompiledModel") -> dict[str, Any]:
     state = off_constraints(evaluator.coordinates.start(start.u))
     evaluator.start(0.0, start.u)
     try:
-        found = operations(evaluator, 0.0, state)
+        return about | {"programs": operations(evaluator, 0.0, state)}
     except (TraceError, CompileError) as error:
         return about | {"reason": f"the scene has no program of its own: {error}"}
-    return about | {
-        "programs": [
-            {"name": program.name, "guards": program.guards, "total": program.total,
-             "parts": program.parts}
-            for program in found
-        ]
-    }  # fmt: skip
 
 
 def _joints(compiled: "CompiledModel", probe: "Result") -> list[dict[str, Any]]:

@@ -39,8 +39,8 @@ def test_they_are_those_that_results_need(name):
             "loads": r" = load double", "sums and products": r" = (?:fadd|fsub|fmul|fneg)\b",
             "quotients and roots": r" = fdiv\b| = call double @llvm\.sqrt",
         }.items():  # fmt: skip
-            assert program.total[kind] == len(re.findall(pattern, left)), kind
-        assert program.guards > 0
+            assert program["total"][kind] == len(re.findall(pattern, left)), kind
+        assert program["guards"] > 0
 
 
 def test_parts_are_named_by_functions_and_types():
@@ -51,5 +51,5 @@ def test_parts_are_named_by_functions_and_types():
     scene.bodies["stone"].r = (1.0, 0.0, 0.0)
     evaluator = dap.compile(scene).new_evaluator()
     (program,) = operations(evaluator, 0.0, evaluator.coordinates.start(evaluator.model.u0))
-    assert {"evaluate.place_bodies", "evaluate.rates", "ptp: wrench"} <= program.parts.keys()
-    assert not any("factor" in part for part in program.parts)
+    assert {"evaluate.place_bodies", "evaluate.rates", "ptp: wrench"} <= program["parts"].keys()
+    assert not any("factor" in part for part in program["parts"])
