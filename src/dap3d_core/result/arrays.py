@@ -123,22 +123,14 @@ def is_summary_of(summary: ModelSummary, model: Model) -> bool:
 
 def summary_of(model: Model) -> ModelSummary:
     """The summary of a model."""
+    same = ("body_names", "mass", "Jp", "joint_names", "joint_rows", "point_names", "point_body",
+            "point_local", "angle_count", "angle_names", "input_names")  # fmt: skip
     return ModelSummary(
-        body_names=model.body_names,
-        mass=model.mass,
-        Jp=model.Jp,
-        joint_names=model.joint_names,
-        joint_rows=model.joint_rows,
-        point_names=model.point_names,
-        point_body=model.point_body,
-        point_local=model.point_local,
+        **{name: getattr(model, name) for name in same},
         has_potential=all("energy" in g.type_info.type.kernels() for g in model.forces),
         is_isolated=not model.forces
         and all(len(slots) > 1 and 0 not in slots for slots in model.joint_slots),
-        angle_count=model.angle_count,
-        angle_names=model.angle_names,
         state_names=tuple(model.state_labels),
-        input_names=model.input_names,
     )
 
 

@@ -229,20 +229,10 @@ def _complex(real: float, imaginary: float) -> str:
 
 def _data_over(name: str, found: "ModesOver") -> dict[str, Any]:
     """The modes as data; null where there is no such mode."""
-    return {
-        "scene": name,
-        "parameter": found.parameter,
-        "unit": found.unit,
-        "values": found.values,
-        "frequencies": found.frequencies,
-        "damping": found.damping,
-        "real": found.eigenvalues.real,
-        "imag": found.eigenvalues.imag,
-        "grows": found.grows,
-        "stable": found.stable,
-        "steady": found.steady,
-        "notes": found.notes,
-    }
+    names = ("parameter", "unit", "values", "frequencies", "damping", "grows", "stable", "steady",
+             "notes")  # fmt: skip
+    parts = {"real": found.eigenvalues.real, "imag": found.eigenvalues.imag}
+    return {"scene": name} | {n: getattr(found, n) for n in names} | parts
 
 
 def _show_over(console: "Terminal", name: str, found: "ModesOver") -> None:

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import attrs
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
@@ -20,6 +19,7 @@ from dap3d_core.scene.validate.coerce_values import (
     numbers_of,
 )
 from dap3d_core.scene.validate.mistake_collector import Collector
+from dap3d_core.scene.validate.validated_scene import Bodies
 
 #: Smaller masses and principal inertias leave double precision in products and quotients.
 SMALLEST_INERTIA = 1e-100
@@ -32,22 +32,6 @@ ZERO_REMEDY = (
     "an infinitely thin rod or a point mass has no unique motion: give a small value, such as "
     "1e-6 of the largest, and show by a second run with another that its effect is small"
 )
-
-
-@attrs.frozen(eq=False)
-class Bodies:
-    """Arrays of n bodies, as in ``ValidatedScene``."""
-
-    body_names: tuple[str, ...]
-    body_index: dict[str, int]
-    mass: Floats
-    Jp: Floats
-    r: Floats
-    p: Floats
-    r_dot: Floats
-    w: Floats
-    r_0: Floats
-    p_0: Floats
 
 
 def read_bodies(report: Collector) -> Bodies:

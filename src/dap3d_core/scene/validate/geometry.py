@@ -12,7 +12,6 @@ from dap3d_core.interface.fields import FieldSpec
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.errors import MISSING, Key
 from dap3d_core.scene.tables import GROUND, ZERO
-from dap3d_core.scene.validate.bodies import Bodies
 from dap3d_core.scene.validate.coerce_columns import Keys, tuples, vectors
 from dap3d_core.scene.validate.coerce_values import (
     SHORTEST,
@@ -21,6 +20,7 @@ from dap3d_core.scene.validate.coerce_values import (
     numbers_of,
 )
 from dap3d_core.scene.validate.mistake_collector import Collector
+from dap3d_core.scene.validate.validated_scene import Bodies
 
 #: Body index (ground 0) and components on that body.
 Located = tuple[int, tuple[float, ...]]

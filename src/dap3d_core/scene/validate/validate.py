@@ -12,11 +12,10 @@ from dap3d_core.scene.errors import MISSING, dotted
 from dap3d_core.scene.scene import Scene
 from dap3d_core.scene.tables import LIMITS, NAMED, RELEASES, fault_of_name
 from dap3d_core.scene.validate.mistake_collector import Collector
-from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene, combines
+from dap3d_core.scene.validate.validated_scene import Bodies, Instance, ValidatedScene, combines
 
 if TYPE_CHECKING:
     from dap3d_core.scene.contacts.collision_shapes import CollisionShapes
-    from dap3d_core.scene.validate.bodies import Bodies
     from dap3d_core.scene.validate.geometry import Geometry
     from dap3d_core.scene.validate.shapes import Shape
     from dap3d_core.scene.validate.types import Types
@@ -154,7 +153,7 @@ def _read_materials(report: Collector) -> Materials:
 
 
 def _read_contacts(
-    report: Collector, bodies: "Bodies", geometry: "Geometry", types: "Types",
+    report: Collector, bodies: Bodies, geometry: "Geometry", types: "Types",
     functions: list[Instance], others: tuple[list[Instance], list[Instance]], materials: Materials,
 ) -> list[Instance]:  # fmt: skip
     """Contacts, limits of joints, and stops that are rigid; others: joints and forces."""
@@ -214,7 +213,7 @@ def _check_requires(report: Collector) -> str:
 
 
 def _check_shapes_and_outputs(
-    report: Collector, bodies: "Bodies", joints: list[Instance], materials: Materials
+    report: Collector, bodies: Bodies, joints: list[Instance], materials: Materials
 ) -> "CollisionShapes | None":
     """Check shapes and outputs; the shapes that collide, or None."""
     shapes: list[Shape] = []
@@ -236,7 +235,7 @@ def _check_shapes_and_outputs(
 
 
 def _note_loose_bodies(
-    report: Collector, bodies: "Bodies", elements: list[Instance],
+    report: Collector, bodies: Bodies, elements: list[Instance],
     collisions: "CollisionShapes | None",
 ) -> None:  # fmt: skip
     """Note bodies without joints and forces, which meet no others."""

@@ -22,7 +22,7 @@ class Instance:
 
     Attributes:
         name: its name in the scene.
-        examined: its type.
+        type_info: its type.
         bodies: body index of each slot of ``type_info.layout.slots`` (ground 0); empty for an
             element that acts on each body.
         functions: for each of ``type_info.layout.functions`` 0 where absent, else 1 + its index
@@ -56,12 +56,10 @@ class Instance:
 
 
 @attrs.frozen(eq=False)
-class ValidatedScene:
-    """A scene without mistakes, as arrays and instances.
+class Bodies:
+    """Arrays of n bodies.
 
     Attributes:
-        scene: the scene as described, with numbers for expressions of its parameters.
-        registry: the source of its types (with those of the model's own file, where needed).
         body_names: n names without ground, in file order.
         body_index: name -> index; ground 0, bodies 1 to n.
         mass: (n,) kg.
@@ -72,6 +70,27 @@ class ValidatedScene:
         w: (n, 3) angular velocities in global axes, rad/s.
         r_0, p_0: (n, 3), (n, 4) reference poses: those from which ``prepare`` finds constants, and
             in which coordinates of joints are zero.
+    """
+
+    body_names: tuple[str, ...]
+    body_index: dict[str, int]
+    mass: "Floats"
+    Jp: "Floats"
+    r: "Floats"
+    p: "Floats"
+    r_dot: "Floats"
+    w: "Floats"
+    r_0: "Floats"
+    p_0: "Floats"
+
+
+@attrs.frozen(eq=False)
+class ValidatedScene(Bodies):
+    """A scene without mistakes, as arrays and instances.
+
+    Attributes:
+        scene: the scene as described, with numbers for expressions of its parameters.
+        registry: the source of its types (with those of the model's own file, where needed).
         point_names: declared points in file order, then animation points (``animation.1``, ...).
         point_body: (points,) body index of each.
         point_local: (points, 3) coordinates on that body, m.
@@ -84,16 +103,6 @@ class ValidatedScene:
 
     scene: Scene
     registry: Registry
-    body_names: tuple[str, ...]
-    body_index: dict[str, int]
-    mass: "Floats"
-    Jp: "Floats"
-    r: "Floats"
-    p: "Floats"
-    r_dot: "Floats"
-    w: "Floats"
-    r_0: "Floats"
-    p_0: "Floats"
     point_names: tuple[str, ...]
     point_body: "Integers"
     point_local: "Floats"
