@@ -28,6 +28,7 @@ from dap3d_core.model.state_layout import (
 )
 from dap3d_core.scene import Instance, ValidatedScene
 from dap3d_core.scene.contacts.collision_shapes import CollisionShapes
+from dap3d_core.scene.validate.validated_scene import Bodies
 
 if TYPE_CHECKING:
     from dap3d_core.model.element_states import ElementState
@@ -42,15 +43,10 @@ EXTENT = 1e-12
 
 
 @attrs.frozen(eq=False)
-class Model:
-    """A scene as the solvers take it.
+class Model(Bodies):
+    """A scene as the solvers take it: its bodies as given, and what acts on them.
 
     Attributes:
-        body_names: (n,) without ground, for reports only.
-        mass: (n,) kg.            Jp: (n, 3, 3) inertia matrix in body axes, kg m^2.
-        r, p: (n, 3), (n, 4) position and unit Euler parameters as given.
-        r_0, p_0: the same of the reference poses, in which coordinates of joints are zero.
-        v, w: (n, 3) velocity and global angular velocity as given.
         joint_names, force_names, function_names: in file order, for reports.
         joint_rows: (joints,) rows of each joint.
         joint_start: (joints + 1,) first row of each joint in C, nu, gamma and lambda.
@@ -72,15 +68,6 @@ class Model:
             they are looked for.
     """
 
-    body_names: tuple[str, ...]
-    mass: Floats
-    Jp: Floats
-    r: Floats
-    p: Floats
-    r_0: Floats
-    p_0: Floats
-    v: Floats
-    w: Floats
     joint_names: tuple[str, ...]
     force_names: tuple[str, ...]
     function_names: tuple[str, ...]
@@ -273,7 +260,7 @@ class Model:
     def u0(self) -> Floats:
         """(13 n,) the state as given, p of unit length."""
         coordinates = np.hstack([self.r, self.p]).ravel()
-        return read_only(np.concatenate([coordinates, np.hstack([self.v, self.w]).ravel()]))
+        return read_only(np.concatenate([coordinates, np.hstack([self.r_dot, self.w]).ravel()]))
 
     @cached_property
     def size(self) -> float:
@@ -356,15 +343,7 @@ def build_model(checked: ValidatedScene) -> Model:
     mask = [j.type_info.type.constraint_mask() for j in holding]  # type: ignore[attr-defined]
     groups = _Groups(checked, poses)
     model = Model(
-        body_names=tuple(checked.body_names),
-        mass=checked.mass,
-        Jp=checked.Jp,
-        r=checked.r,
-        p=checked.p,
-        r_0=checked.r_0,
-        p_0=checked.p_0,
-        v=checked.r_dot,
-        w=checked.w,
+        **{field.name: getattr(checked, field.name) for field in attrs.fields(Bodies)},
         joint_names=tuple(j.name for j in holding),
         force_names=tuple(f.name for f in checked.forces),
         function_names=tuple(f.name for f in checked.functions),

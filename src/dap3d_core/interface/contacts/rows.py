@@ -9,6 +9,8 @@ given besides: of contacts that share what they carry, the one that all cones al
 # Kernels take numbers of any kind: floats, and symbols of a trace.
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
 
+from typing import Any
+
 from dap3d_core.kernels import add, cross, dot, neg, row, scale, sqrt, sub, where
 
 #: Modes of a contact; in the last one, of time stepping, all rows hold as where it sticks.
@@ -330,7 +332,7 @@ def turning_output(gap, n, lam, mode, near):
 KERNELS = {"C": position, "J": blocks, "gamma": gamma, "friction": friction, "switch": switch,
            "rate": rate, "tension": output}  # fmt: skip
 #: Those in their place, by what a type of contact declares.
-KERNELS_WITH = {
+KERNELS_WITH: dict[str, dict[str, Any]] = {
     "reach": {"C": position_within, "switch": switch_within},
     "grip": {"tension": output_with_law},
 }
