@@ -18,8 +18,9 @@ import numpy as np
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.simulation.equilibrium.search import BALANCED, held_solution, zero_stiffness
-from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics, displacement
+from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics
 from dap3d_core.simulation.errors import AssemblyError, SimulationError
+from dap3d_core.simulation.initial.least_change import displacement
 
 #: The first step, and the shortest, at which the path ends; at most so many are taken. Lengths are
 #: of the parameter, as a part of its range, and of the root mean square of displacements, as parts

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import at_rest
-from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics, displacement
+from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics
 from dap3d_core.simulation.errors import AssemblyError
+from dap3d_core.simulation.initial.least_change import displacement
 
 #: A stiffness below this part of the largest is none: rounding errors of K.
 NEUTRAL = 1e-11

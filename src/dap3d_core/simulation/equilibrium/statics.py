@@ -21,11 +21,14 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.function_lists import call_loop
 from dap3d_core.linear.rank.rank import tolerance_of
 from dap3d_core.model.element_states import first_states, paths_where, width_of
-from dap3d_core.model.rigid_motion import conjugate, quaternion_product, rotation_vector
-from dap3d_core.model.state_layout import split
 from dap3d_core.simulation.errors import AssemblyError, SimulationError
 from dap3d_core.simulation.initial.assemble import fit_of, weights_of
-from dap3d_core.simulation.initial.least_change import displaced, finite_rows, sparse_least_change
+from dap3d_core.simulation.initial.least_change import (
+    displaced,
+    displacement,
+    finite_rows,
+    sparse_least_change,
+)
 from dap3d_core.simulation.linearization.tangent import TangentMatrices, tangent_matrices
 
 #: Displacements of bodies, rad or parts of the scene, that show how large forces are.
@@ -221,13 +224,6 @@ class Statics:
             return 0
         blur = fit_of(self.evaluator.model)
         return int(np.sum(values > max(tolerance_of(*shape) * values[0], blur)))
-
-
-def displacement(u: Floats, other: Floats) -> tuple[Floats, Floats]:
-    """Displacements, m, and rotation vectors, rad, global axes, (n, 3), from a state to another."""
-    r, p, _, _ = split(u)
-    s, q, _, _ = split(other)
-    return s - r, rotation_vector(quaternion_product(q, conjugate(p)))
 
 
 def settle(evaluator: Evaluator, t: float, u: Floats) -> None:

@@ -24,6 +24,7 @@ from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial.least_change import (
     RCOND,
     displaced,
+    displacement,
     displacements,
     finite_rows,
     least_change,
@@ -425,16 +426,11 @@ def _closing(
 
 def _rotations(model: Model, start: Floats, end: Floats) -> str:
     """The rotations of bodies from one state (13 n,) to another, in words."""
-    p, q = split(start)[1], split(end)[1]
-    # q = d p, Euler parameters of the rotation between them: d = q p*
-    cosine = np.sum(p * q, axis=1)
-    sine = p[:, :1] * q[:, 1:] - q[:, :1] * p[:, 1:] - np.cross(q[:, 1:], p[:, 1:])
-    sine *= np.where(cosine < 0.0, -1.0, 1.0)[:, None]
-    size = np.linalg.norm(sine, axis=1)
-    angle = 2.0 * np.arctan2(size, np.abs(cosine))
+    _, turn = displacement(start, end)
+    angle = np.linalg.norm(turn, axis=1)
     order = [int(k) for k in np.argsort(-angle, kind="stable") if angle[k] > TURNED]
     listed = [
-        f"{model.body_names[k]} turned by {angle[k]:.3g} rad about {_axis(sine[k] / size[k])}"
+        f"{model.body_names[k]} turned by {angle[k]:.3g} rad about {_axis(turn[k] / angle[k])}"
         for k in sorted(order[:MOST_BODIES])
     ]
     more = [f"and {len(order) - MOST_BODIES} bodies more"] if len(order) > MOST_BODIES else []

@@ -14,6 +14,7 @@ from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.linear.rank.rank import DENSE_ROWS, FEW_ROWS, factor_independent, has_loops
+from dap3d_core.model.rigid_motion import conjugate, quaternion_product, rotation_vector
 from dap3d_core.model.rotations import euler_rates
 from dap3d_core.model.state_layout import join, split, velocities_of
 from dap3d_core.simulation.errors import AssemblyError
@@ -169,3 +170,10 @@ def displaced(u: Floats, change: Floats) -> Floats:
     change = change.reshape(-1, 6)
     p = p + euler_rates(p, change[:, 3:])
     return join(r + change[:, :3], p / np.linalg.norm(p, axis=1, keepdims=True), v, w)
+
+
+def displacement(u: Floats, other: Floats) -> tuple[Floats, Floats]:
+    """Displacements, m, and rotation vectors, rad, global axes, (n, 3), from a state to another."""
+    r, p, _, _ = split(u)
+    s, q, _, _ = split(other)
+    return s - r, rotation_vector(quaternion_product(q, conjugate(p)))
