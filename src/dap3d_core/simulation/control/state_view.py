@@ -27,6 +27,12 @@ AXES = {"x": 0, "y": 1, "z": 2}
 TURN = 2.0 * math.pi
 
 
+def _of_bodies(quantity: str, text: str) -> Any:
+    """The attribute for a quantity of all bodies."""
+    first, count = OF_BODIES[quantity]
+    return property(lambda view: view._placed[:, first : first + count], doc=text)
+
+
 class StateView:
     """The present state of a run: quantities by their names in results, ``state["crank.r.z"]``.
 
@@ -58,32 +64,16 @@ class StateView:
         """Time, s."""
         return float(self._real[T])
 
-    @property
-    def r(self) -> Floats:
-        """(n, 3) positions of the mass centres, m, a view."""
-        return self._placed[:, R : R + 3]
-
-    @property
-    def p(self) -> Floats:
-        """(n, 4) Euler parameters, a view."""
-        return self._placed[:, P : P + 4]
-
-    @property
-    def rd(self) -> Floats:
-        """(n, 3) velocities of the mass centres, m/s, a view."""
-        return self._placed[:, V : V + 3]
-
-    @property
-    def w(self) -> Floats:
-        """(n, 3) angular velocities, global axes, rad/s, a view."""
-        return self._placed[:, W : W + 3]
+    r: Floats = _of_bodies("r", "(n, 3) positions of the mass centres, m, a view.")
+    p: Floats = _of_bodies("p", "(n, 4) Euler parameters, a view.")
+    rd: Floats = _of_bodies("rd", "(n, 3) velocities of the mass centres, m/s, a view.")
+    w: Floats = _of_bodies("w", "(n, 3) angular velocities, global axes, rad/s, a view.")
 
     @property
     def u(self) -> Floats:
         """(13 n,) the state in the order of ``Result.u``; a copy."""
-        body = self._placed
-        parts = body[:, R : R + 3], body[:, P : P + 4], body[:, V : V + 3], body[:, W : W + 3]
-        return np.concatenate([np.hstack(parts[:2]).ravel(), np.hstack(parts[2:]).ravel()])
+        halves = (self.r, self.p), (self.rd, self.w)
+        return np.concatenate([np.hstack(half).ravel() for half in halves])
 
     def __getitem__(self, name: str) -> Any:
         """A quantity by its name in results: a number, or (components,).
