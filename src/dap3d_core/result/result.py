@@ -49,6 +49,9 @@ NO_TURNS = (
     "reported instant to the next, and wrong where a rate changes by more than half a turn per "
     "reporting step between two; run the scene anew"
 )
+#: Shapes of stored arrays by their dimension besides time.
+SHAPES = {"": "(nt,)", "state": "(nt, 13 n)", "velocity": "(nt, 6 n)", "row": "(nt, m)",
+          "input": "(nt, k)"}  # fmt: skip
 #: A model, and a function that returns an evaluator of it.
 Origin = tuple[Model, "Callable[[], Evaluator]"]
 #: Makes an origin from the text of a scene.
@@ -78,8 +81,12 @@ def _motion(array: str) -> cached_property[Floats]:
 def _stored(array: str) -> Any:
     """The attribute for a stored array."""
     column = next(column for column in COLUMNS if column.name == array)
-    text = f"({', '.join(column.dimensions)}) {column.meaning}; unit {column.unit}."
-    return property(lambda result: getattr(result.arrays, array), doc=text)
+
+    def values(result: "Result") -> Floats:
+        return getattr(result.arrays, array)
+
+    unit = "" if column.unit == "SI" else f", {column.unit}"
+    return property(values, doc=f"{SHAPES[column.dimension]} {column.meaning}{unit}.")
 
 
 class Result(ResultDisplay, ResultContacts):

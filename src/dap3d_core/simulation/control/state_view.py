@@ -30,7 +30,11 @@ TURN = 2.0 * math.pi
 def _of_bodies(quantity: str, text: str) -> Any:
     """The attribute for a quantity of all bodies."""
     first, count = OF_BODIES[quantity]
-    return property(lambda view: view._placed[:, first : first + count], doc=text)
+
+    def values(view: "StateView") -> Floats:
+        return view._placed[:, first : first + count]
+
+    return property(values, doc=text)
 
 
 class StateView:
