@@ -53,6 +53,8 @@ if TYPE_CHECKING:
     from dap3d_core.simulation.initial.start_state import StartState
 
 Announce = Callable[[str], None]
+#: Options of a start: whether it is corrected, what is held, the metric.
+StartOptions = tuple[bool, tuple[str, ...], str]
 
 #: Joints whose lines in the file a message gives.
 MOST_PLACES = 10
@@ -135,9 +137,9 @@ class CompiledModel:
         usual = usual and self.model.collisions is None
         self._may_choose_joint = usual if joint is None else joint
         self._breakpoints: dict[float, Breakpoints] = {}
-        self._starts: dict[tuple[bool, tuple[str, ...], str], InitialState] = {}
+        self._starts: dict[StartOptions, InitialState] = {}
         #: Equilibria that runs start at, by the options of ``start``; each is found once.
-        self.rest_states: dict[tuple[bool, tuple[str, ...], str], StartState] = {}
+        self.rest_states: dict[StartOptions, StartState] = {}
         self._own = _Evaluators()
         self._take_method(requested, announce)
         self.evaluator.formulation = FORMULATIONS[self.method]
@@ -329,10 +331,7 @@ class CompiledModel:
         return self._starts[key]
 
     def _find_start(
-        self,
-        evaluator: Evaluator,
-        key: tuple[bool, tuple[str, ...], str],
-        state: "StartState | None" = None,
+        self, evaluator: Evaluator, key: StartOptions, state: "StartState | None" = None
     ) -> InitialState:
         """As ``start``, with an evaluator."""
         active: AbstractContextManager[object] = nullcontext()
@@ -380,7 +379,7 @@ class CompiledModel:
         return method, f"{reason}, and their rows are independent"
 
     @property
-    def _usual_start(self) -> tuple[bool, tuple[str, ...], str]:
+    def _usual_start(self) -> StartOptions:
         """The options of ``start`` for a run with the scene's own settings."""
         settings = self.scene.simulation
         return settings.correct, tuple(settings.hold), str(settings.correct_metric)
