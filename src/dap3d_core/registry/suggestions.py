@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 
 #: Number of words up to which all are compared; of more, this many neighbours in either order.
 MANY_WORDS, NEIGHBOURS = 200, 25
+#: Names that a message lists, as a rule.
+MOST_NAMES = 6
 #: Nothing is similar to a longer word.
 LONGEST = 80
 #: Names in a scene -> what other programs and textbooks call them.
@@ -83,7 +85,7 @@ def did_you_mean(
     return form.format(f"did you mean {near!r}?") if near else otherwise
 
 
-def some(names: Sequence[str], most: int, between: str = ", ") -> str:
+def some(names: Sequence[str], most: int = MOST_NAMES, between: str = ", ") -> str:
     """The first of several names, and the number of the others."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return between.join(names[:most]) + more

@@ -17,7 +17,7 @@ from dap3d_core.formulations.joint_loops import layout
 from dap3d_core.formulations.joint_loops.profile import PART
 from dap3d_core.interface.codegen.loop_source import stride
 from dap3d_core.linear.ldlt.factor import SINGULAR_PIVOT_RATIO
-from dap3d_core.linear.ldlt.plan import Plan
+from dap3d_core.linear.ldlt.plan import Plan, table_of
 from dap3d_core.linear.ordering.spanning_forest import CARRY
 from dap3d_core.model import Group, Model
 
@@ -165,10 +165,10 @@ def kept_row_arrays(
     return KeptRowArrays(
         calls=np.concatenate(calls),
         call_counts=np.array([len(c) for c in calls], dtype=np.int64),
-        cuts=_table(cuts, layout.CUT_WIDTH),
-        ends=_table(ends, layout.END_WIDTH),
-        ways=_table(ways, layout.STEP_WIDTH),
-        pairs=_table(pairs, layout.PAIR_WIDTH),
+        cuts=table_of(cuts, layout.CUT_WIDTH),
+        ends=table_of(ends, layout.END_WIDTH),
+        ways=table_of(ways, layout.STEP_WIDTH),
+        pairs=table_of(pairs, layout.PAIR_WIDTH),
         profile=np.stack([kept.coupled, start[:-1] - kept.coupled], axis=1),
         D=np.zeros(plan.block_size),
         loads=np.zeros(size),
@@ -216,11 +216,7 @@ def kept_calls(
             edges = np.flatnonzero(of_kept[1:] != of_kept[:-1]).reshape(-1, 2)
             for begin, end in edges.tolist():
                 calls[kind].append((q, i0 + per * begin, p0 + width * begin, end - begin))
-    return _table(calls["acceleration"], 4), _table(calls["position"], 4)
-
-
-def _table(rows: Sequence[Sequence[int]], width: int) -> Integers:
-    return np.array(rows, dtype=np.int64).reshape(-1, width)
+    return table_of(calls["acceleration"], 4), table_of(calls["position"], 4)
 
 
 @IGNORE_FLOAT_ERRORS

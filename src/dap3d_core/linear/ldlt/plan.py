@@ -164,7 +164,7 @@ def list_updates(
             updates.extend(panels.gathered(k))
             updates.extend(panels.products(k))
         begins.append(len(updates))
-    return _table(updates, 6), begins
+    return table_of(updates, 6), begins
 
 
 class _Panels:
@@ -323,7 +323,7 @@ def make_plan(
     updates, update_start = list_updates(found, starts, matrix)
     hub_rows = [(b, starts[place[hubs[b]]]) for b in found.hubs]
     filled = sum(1 for row, column in made_of if row != column)
-    nodes, columns = _nodes(found, starts, matrix, update_start), _table(matrix.columns, 3)
+    nodes, columns = _nodes(found, starts, matrix, update_start), table_of(matrix.columns, 3)
     return Plan(
         ordering=found,
         joint_row=np.array(joint_row, dtype=np.int64),
@@ -331,13 +331,13 @@ def make_plan(
         row_size=starts[-1],
         block_size=block_size,
         matrix_size=matrix.size,
-        blocks=_table(blocks, 5),
+        blocks=table_of(blocks, 5),
         targets=targets,
         contributions=contributions,
         nodes=nodes,
         columns=columns,
         updates=updates,
-        hubs=_table(hub_rows, 2),
+        hubs=table_of(hub_rows, 2),
         fill=sum(map(len, found.below)) - filled,
         unfilled_size=sum(m * m for m in sizes)
         + sum(sizes[row] * sizes[column] for row, column in made_of if row != column),
@@ -353,10 +353,11 @@ def _nodes(
         begin = matrix.column_start[k], update_start[k]
         rows.append((size, starts[first], matrix.place[k], sign, *begin))
     rows.append((0, starts[-1], matrix.size, 0, matrix.column_start[-1], update_start[-1]))
-    return _table(rows, 6)
+    return table_of(rows, 6)
 
 
-def _table(rows: Sequence[Sequence[int]], width: int) -> Integers:
+def table_of(rows: Sequence[Sequence[int]], width: int) -> Integers:
+    """Integers in rows of a width, of no rows as well."""
     return np.array(rows, dtype=np.int64).reshape(-1, width)
 
 
@@ -446,4 +447,4 @@ def _targets(
                 if is_hub != found.is_hub(row) and (row, column) in contents:
                     kind = COPY if is_hub else TRANSPOSE
                 add(where, sizes[row], m, kind, contents.get((row, column), ()))
-    return _table(targets, 6), _table(contributions, 2)
+    return table_of(targets, 6), table_of(contributions, 2)

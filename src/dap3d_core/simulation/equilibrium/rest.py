@@ -12,7 +12,7 @@ from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Group, Model
 from dap3d_core.model.state_layout import at_rest, velocities_of
-from dap3d_core.registry.suggestions import some
+from dap3d_core.registry.suggestions import MOST_NAMES, some
 from dap3d_core.result import information
 from dap3d_core.simulation.equilibrium.search import (
     Outcome,
@@ -39,8 +39,6 @@ RCOND = 1e-10
 PASS_SETTLED, CARRIED = 1e-12, 1e-8
 #: Gap, m of a scene of ordinary size, below which bodies touch.
 TOUCHING = 1e-8
-#: Names that a note lists.
-MOST_NAMES = 6
 #: Bodies that move this part of the largest motion, or more, are named.
 ALIKE = 0.5
 #: A direction counts as an axis if this cosine belongs to it.
@@ -141,7 +139,7 @@ def _hold_contacts(evaluator: Evaluator, u: Floats, where: str) -> None:
         bad, slips = over, "overlaps"
     if bad:
         raise SimulationError(
-            f"{where} contact {some(bad, MOST_NAMES)} {slips}. Contacts rest where friction holds "
+            f"{where} contact {some(bad)} {slips}. Contacts rest where friction holds "
             "them from the start on: take a start that rests, such as the end of a damped run "
             "(start=result)"
         )
@@ -187,7 +185,7 @@ def _with_brought(
             break
     moves = statics.scale * (force + D.T @ multipliers) - left
     if np.max(np.abs(moves)) > CARRIED * np.max(np.abs(statics.scale * (force - applied))):
-        names = some(list(evaluator.model.brought_forces.values()), MOST_NAMES)
+        names = some(list(evaluator.model.brought_forces.values()))
         raise SimulationError(
             f"statics does not know how forces of {names} move the wheels that they press apart: "
             "their axes are not held by joints. Take the force gear, an elastic mesh, or "
@@ -312,11 +310,11 @@ def assumptions(evaluator: Evaluator, start: Floats, rows: ConstraintRows) -> It
         yield information("velocities of the start are left out")
     timed = [name for group in model.forces for name in _of_time(group, model)]
     if timed:
-        listed = some(timed, MOST_NAMES)
+        listed = some(timed)
         yield information(f"forces that depend on time are those at t = 0: {listed}")
     driven = model.row_owners(np.flatnonzero(rows.nu))
     if driven:
-        listed = some(driven, MOST_NAMES)
+        listed = some(driven)
         yield information(f"drivers are at rest at their initial values: {listed}")
     if model.friction:
         yield (
@@ -326,7 +324,7 @@ def assumptions(evaluator: Evaluator, start: Floats, rows: ConstraintRows) -> It
     if rolling:
         yield information(
             "what rolls or sticks constrains displacements as it does velocities: "
-            f"{some(rolling, MOST_NAMES)}; where the scene comes to rest depends on the way there"
+            f"{some(rolling)}; where the scene comes to rest depends on the way there"
         )
 
 

@@ -17,8 +17,6 @@ from dap3d_core.scene.validate.coerce_values import LARGEST
 #: Where to look behind the last good state, as parts of the time.
 AHEAD = (0.0, 1e-12, 1e-9, 1e-6, 1e-3)
 
-#: Names that a message lists.
-MOST_NAMES = 6
 #: A row this many times the others, in its own units, indicates a pose that its joint cannot have.
 STEEP = 1e6
 #: A state or a rate, in SI units, beyond which no step succeeds for long: cubes soon overflow.
@@ -92,7 +90,7 @@ def _jammed(evaluator: Evaluator, t: float, y: Floats) -> str:
     if not slides or np.isfinite(evaluator.report(t, u)[model.report_layout["Lam"]]).all():
         return ""
     return (
-        f"friction {some(slides, MOST_NAMES)} slides and jams: it raises the load of its joint by "
+        f"friction {some(slides)} slides and jams: it raises the load of its joint by "
         "more than that load, or the pose is singular, and no motion with Coulomb's law goes on"
     )
 

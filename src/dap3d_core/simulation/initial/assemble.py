@@ -95,7 +95,7 @@ def violation(evaluator: Evaluator, u: Floats, t: float = 0.0) -> tuple[float, f
     rows = finite_rows(evaluator, t, u)
     weight = weights_of(evaluator)
     residual = rows.product(velocities_of(u)) - rows.nu
-    return _largest(weight * rows.C), _largest(weight * residual)
+    return largest(weight * rows.C), largest(weight * residual)
 
 
 def weights_of(evaluator: Evaluator) -> Floats:
@@ -135,7 +135,7 @@ def correct_initial(
     branch = _rotations(evaluator.model, start, u) if passes > MOST_PASSES else ""
     rows = finite_rows(evaluator, t, u)
     residual = rows.product(velocities_of(u)) - rows.nu
-    if _largest(residual) > 0.0:
+    if largest(residual) > 0.0:
         u = u.copy()
         velocities = velocities_of(u)
         velocities -= least_change(evaluator, rows, residual, t, None, metric)
@@ -173,7 +173,7 @@ def correction_notes(initial: Initial, evaluator: Evaluator, scene: Scene) -> li
             f"stays open. Below {FIT:g} the run goes on as if they fitted"
         )
     if velocity > tolerance:
-        speed = _largest(velocities_of(evaluator.model.u0))
+        speed = largest(velocities_of(evaluator.model.u0))
         usual = attrs.fields(Body)
         open_ = all(
             body.r_dot is usual.r_dot.default and body.w is usual.w.default
@@ -207,7 +207,7 @@ def correct_positions(
     closed = length * (TOLERANCE if tolerance is None else tolerance)
     for passes in range(MOST_PASSES + 1):
         rows = finite_rows(evaluator, t, u)
-        worst = _largest(weight * rows.C)
+        worst = largest(weight * rows.C)
         stands = worst > 0.5 * before and worst <= max(fit, TOLERANCE * length)
         if worst <= closed or stands:
             return u, passes
@@ -278,10 +278,11 @@ def fit_of(model: Model) -> float:
 def max_speed(evaluator: Evaluator, v: Floats) -> float:
     """Largest speed at velocities (6 n,), in rad/s or lengths of the model a second."""
     x = np.abs(v.reshape(-1, 6))
-    return max(_largest(x[:, :3]) / evaluator.model.size, _largest(x[:, 3:]))
+    return max(largest(x[:, :3]) / evaluator.model.size, largest(x[:, 3:]))
 
 
-def _largest(values: Floats) -> float:
+def largest(values: Floats) -> float:
+    """The largest magnitude; 0 of no values."""
     return float(np.max(np.abs(values), initial=0.0))
 
 
@@ -291,7 +292,7 @@ def _failure(
     """Reason of the failure: the open joints, the worst first, in lines of at most 80 columns."""
     model, C = evaluator.model, weights_of(evaluator) * rows.C
     tolerance = TOLERANCE * model.length
-    worst = np.array([_largest(C[a:b]) for a, b in pairwise(model.joint_start)])
+    worst = np.array([largest(C[a:b]) for a, b in pairwise(model.joint_start)])
     still_open = [int(k) for k in np.argsort(-worst, kind="stable") if worst[k] > tolerance]
     types = {int(k): group.keyword for group in model.joints for k in group.members}
     lines = [f"  {'joint':30} {'type':10} {'residual':>9}  rows"]

@@ -21,8 +21,6 @@ from dap3d_core.scene.errors import shown
 
 #: A time is a reported one if it differs from it by this part of the result's span.
 SAME_TIME = 1e-12
-#: Names that a message lists.
-MOST_NAMES = 6
 
 
 @attrs.frozen(eq=False)
@@ -127,13 +125,13 @@ def _matched(named: NamedState, model: Model, scene: Scene) -> StartState:
         noun = "body" if len(missing) == 1 else "bodies"
         raise _mistake(
             named.title,
-            f"it is of another scene: it has no {noun} {some(near, MOST_NAMES)}; its bodies are "
-            f"{some(list(place), MOST_NAMES)}",
+            f"it is of another scene: it has no {noun} {some(near)}; its bodies are "
+            f"{some(list(place))}",
         )
     notes = list(named.notes)
     unused = [body for body in place if body not in model.body_names]
     if unused:
-        listed = some(unused, MOST_NAMES)
+        listed = some(unused)
         notes.append(f"bodies of the start that the scene does not have: {listed}")
     index = [place[body] for body in model.body_names]
     r, p, v, w = split(named.u)
@@ -144,12 +142,12 @@ def _matched(named: NamedState, model: Model, scene: Scene) -> StartState:
         if n not in named.angles
     })  # fmt: skip
     if uncounted:
-        listed = some(uncounted, MOST_NAMES)
+        listed = some(uncounted)
         notes.append(f"turns are counted from zero, for the start has none: {listed}")
     angles = np.array([named.angles.get(name, 0.0) for name in names]) if names else None
     labels = model.state_labels
     if missing := sorted({n.rpartition(".")[0] for n in labels if n not in named.states}):
-        listed = some(missing, MOST_NAMES)
+        listed = some(missing)
         notes.append(f"states begin with their initial values, for the start has none of {listed}")
     given = zip(labels, model.initial_states.tolist(), strict=True)
     states = np.array([named.states.get(n, value) for n, value in given]) if labels else None
@@ -171,7 +169,7 @@ def _numbers_notes(named: NamedState, model: Model, scene: Scene) -> list[str]:
         return []
     return [
         "the run begins with the inputs and numbers of forces of the scene; where it starts, "
-        f"scripts had given {named.title} others: {some(others, MOST_NAMES)}"
+        f"scripts had given {named.title} others: {some(others)}"
     ]
 
 

@@ -28,6 +28,7 @@ from dap3d_core.linear.rank.rank import Dependency
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import rotation, skew
 from dap3d_core.model.state_layout import split
+from dap3d_core.simulation.initial.assemble import largest
 from dap3d_core.simulation.linearization.tangent import TangentMatrices
 
 #: Accelerations beyond those of the steady motion, as a part of those that forces would give, those
@@ -104,15 +105,15 @@ def steady_frames(
     unit = np.repeat([length, 1.0], 3)
     loads = np.maximum(loads, np.abs(tangent.stiffness) @ np.tile(unit, n))  # f may balance
     size = loads.reshape(n, 6) / mass / unit
-    rate = max(_largest(w), _largest(v) / length, float(np.sqrt(_largest(size))))
-    is_steady = _largest(missed[:, :6]) <= STEADY * rate**2
-    is_steady = is_steady and _largest(missed[:, 6:]) <= STEADY * rate
+    rate = max(largest(w), largest(v) / length, float(np.sqrt(largest(size))))
+    is_steady = largest(missed[:, :6]) <= STEADY * rate**2
+    is_steady = is_steady and largest(missed[:, 6:]) <= STEADY * rate
     Omega[np.abs(Omega) <= RCOND * rate] = 0.0
     if is_steady and (np.any(v) or np.any(w)):
         change = acceleration_rates(tangent, np.hstack([v, w]).ravel(), dependencies).reshape(n, 6)
         change[:, :3] -= np.cross(Omega, a[:, :3])
         change[:, 3:] -= np.cross(Omega, a[:, 3:])
-        is_steady = _largest(change / np.repeat([length, 1.0], 3)) <= STEADY * rate**3
+        is_steady = largest(change / np.repeat([length, 1.0], 3)) <= STEADY * rate**3
     if not is_steady:
         Omega = np.zeros((n, 3))
     return SteadyFrames(Omega, of_translation * Omega, tuple(drift - {0.0}), is_steady)
@@ -153,10 +154,6 @@ def acceleration_rates(
     except RuntimeError:  # exactly singular
         return np.full(len(a), np.nan)
     return rates
-
-
-def _largest(values: Floats) -> float:
-    return float(np.max(np.abs(values), initial=0.0))
 
 
 def _free(tangent: TangentMatrices, sets: Sequence[Any]) -> NDArray[np.bool_]:

@@ -36,10 +36,6 @@ if TYPE_CHECKING:
     from dap3d_core.formulations.common.state_derivatives import StateDerivatives
 
 
-#: Names that an error message lists.
-MOST_NAMES = 6
-
-
 @attrs.frozen(eq=False, kw_only=True)
 class TangentMatrices:
     """The equations of motion at a state and their derivatives; matrices are scipy CSR arrays.
@@ -154,7 +150,7 @@ def _check_states(model: Model, own: "StateDerivatives", t: float) -> None:
         wrong |= ~np.isfinite(np.asarray(abs(matrix).sum(axis=1)).ravel())
     if names := paths_where(model.element_states, wrong):
         raise SimulationError(
-            f"the rate of {', '.join(names[:MOST_NAMES])} has no derivative at t = {t:g} s: the "
+            f"the rate of {some(names)} has no derivative at t = {t:g} s: the "
             "equations cannot be linearised here; move the state off this point"
         )
 
@@ -279,7 +275,7 @@ class _Assembly:
         names = model.joint_names if is_joint else model.force_names
         words = list(dict.fromkeys(names[int(k)] for k in group.members[wrong]))
         return (
-            f"{'joint' if is_joint else 'force'} {some(words, MOST_NAMES)} has no derivative at "
+            f"{'joint' if is_joint else 'force'} {some(words)} has no derivative at "
             f"t = {self.t:g} s: the equations cannot be linearised here; move the state off this "
             "point"
         )

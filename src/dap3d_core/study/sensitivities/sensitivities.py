@@ -294,7 +294,7 @@ def _notes(compiled: CompiledModel, runs: "Sequence[DifferentiatedRun]") -> list
         return of_laws
     return [
         *of_laws,
-        f"derivatives: the start leaves its constraints with {some(found, 6)} and is not "
+        f"derivatives: the start leaves its constraints with {some(found)} and is not "
         "corrected: they are those of a start that is brought onto the constraints (switch correct "
         "on for runs that do so)",
     ]
