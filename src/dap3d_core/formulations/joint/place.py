@@ -9,6 +9,7 @@ from typing import Any
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.evaluate import place_states
 from dap3d_core.assembly.metric import orient_by_state, put_rotation, square_of
+from dap3d_core.assembly.turns import vector_of
 from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.formulations.joint.half_angles import half_angles
 from dap3d_core.kernels.runtime.array_struct import pointer
@@ -17,12 +18,6 @@ from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A, P, R, V, W
 from dap3d_core.kernels.vectors import add, cross, scale
 
 Vector = Any
-
-
-@compiled_into
-def vector_of(x: Floats, k: int) -> Vector:
-    """The 3-vector at k."""
-    return x[k], x[k + 1], x[k + 2]
 
 
 @compiled_into

@@ -12,8 +12,9 @@ from typing import Any
 
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.metric import gyroscopic_moment
+from dap3d_core.assembly.turns import vector_of
 from dap3d_core.formulations.joint import node_layout as node
-from dap3d_core.formulations.joint.place import in_node_axes, put, times, vector_of
+from dap3d_core.formulations.joint.place import in_node_axes, put, times
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A, V, W

@@ -4,8 +4,9 @@ Featherstone, Rigid Body Dynamics Algorithms (2008), 7.3.
 """
 
 from dap3d_core.assembly.arrays import Floats, System
+from dap3d_core.assembly.turns import vector_of
 from dap3d_core.formulations.joint import node_layout as node
-from dap3d_core.formulations.joint.place import Vector, in_node_axes, put, times, vector_of
+from dap3d_core.formulations.joint.place import Vector, in_node_axes, put, times
 from dap3d_core.formulations.joint.reduce import factors_of, six_of, solve_factored
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into

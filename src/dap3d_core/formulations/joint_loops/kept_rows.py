@@ -9,9 +9,10 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import LENGTH, VALUE, Floats, System
 from dap3d_core.assembly.evaluate import call_kinds, largest_weighted
+from dap3d_core.assembly.turns import vector_of
 from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.formulations.joint.equations import normalise_rotations
-from dap3d_core.formulations.joint.place import place_tree, put, vector_of
+from dap3d_core.formulations.joint.place import place_tree, put
 from dap3d_core.formulations.joint.reduce import reduce_nodes
 from dap3d_core.formulations.joint.spread import spread_tree
 from dap3d_core.formulations.joint_loops import layout

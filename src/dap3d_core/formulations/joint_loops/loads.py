@@ -14,8 +14,9 @@ from typing import Any
 
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.evaluate import zero
+from dap3d_core.assembly.turns import vector_of
 from dap3d_core.formulations.joint import node_layout as node
-from dap3d_core.formulations.joint.place import put, times, vector_of
+from dap3d_core.formulations.joint.place import put, times
 from dap3d_core.formulations.joint.reduce import (
     factors_of,
     nine_of,
