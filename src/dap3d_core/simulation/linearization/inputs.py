@@ -201,9 +201,10 @@ def _driver(point: OperatingPoint, evaluator: Evaluator, name: str) -> list[Floa
             column[start : start + len(slope)] = slope
             result.append(column)
         return result
-    known, element = _inputs_known(point, evaluator), name.partition(".")[0]
+    known = _inputs_known(point, evaluator)
+    element = name.removeprefix("inputs.").partition(".")[0]  # sweeps say inputs.NAME.value
     if element in known:
-        raise UnknownNameError(f"input {name!r}: a driver is an input as a whole; name {element}")
+        raise UnknownNameError(f"input {name!r}: {element} is an input as a whole; name {element}")
     raise unknown("input, force or driver", element, known)
 
 
