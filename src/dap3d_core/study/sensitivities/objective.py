@@ -69,7 +69,7 @@ class Objective:
         self.runs = self.gradients = 0
 
     def __repr__(self) -> str:
-        return f"<Objective {self._quantity} by {', '.join(self.names)} of {self._scene!r}>"
+        return f"<Objective by {', '.join(self.names)} of {self._scene!r}>"
 
     def __call__(self, x: ArrayLike) -> float:
         """The value at a point x (p,). Errors as of ``simulate``."""
