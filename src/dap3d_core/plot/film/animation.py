@@ -27,6 +27,7 @@ from dap3d_core.plot.film.projection import (
 from dap3d_core.plot.film.stick_figure import pose_at, sticks_of
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result, ResultError
+from dap3d_core.result.errors import unknown
 from dap3d_core.result.file.atomic_write import cannot, whole_file
 
 #: Pixels; a height of 0 becomes one that suits the motion.
@@ -158,6 +159,7 @@ def animate(
     view: str | None = None,
     at: float | None = None,
     fit: bool = False,
+    follow: str | None = None,
     model: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
     force: bool = False,
@@ -178,6 +180,7 @@ def animate(
             default along the axis across a plane motion, else from the side and above.
         at: time of a snapshot, s; by default the first instant.
         fit: frame the whole motion, whatever limits the scene's [animation] gives.
+        follow: a body that stays in its place of the picture; what else moves is seen from there.
         model: the model (a name, a folder, a file) in whose folder meshes of shapes lie.
         progress: called as progress(done, frames).
         force: overwrites an existing file.
@@ -185,11 +188,13 @@ def animate(
     Raises:
         ValueError: no instants; an invalid suffix, number or view.
         ResultError: the file cannot be written, or exists and ``force`` is off; no ffmpeg.
+        UnknownNameError: there is no such body.
     """
     target = Path(path)
     suffix = target.suffix.lower()
     _check(result, target, fps, speed, size, at)
-    stage, notes = _stage_of(result, view, size, model, fit=fit, still=suffix not in FILMS)
+    is_still = suffix not in FILMS
+    stage, notes = _stage_of(result, view, size, model, follow, fit=fit, still=is_still)
     duration = float(result.t[-1] - result.t[0])
     speed, times = speed or usual_speed(duration), np.array([result.t[0] if at is None else at])
     if suffix in FILMS:
@@ -214,17 +219,26 @@ def _stage_of(
     view: str | None,
     size: tuple[int, int],
     model: str | os.PathLike[str] | None,
+    follow: str | None,
     *,
     fit: bool,
     still: bool,
 ) -> tuple[Stage, tuple[str, ...]]:
     """The stage, and notes on what it shows."""
+    if follow is not None and follow not in result.summary.body_names:
+        raise unknown("body", follow, result.summary.body_names)
+    about = None if follow is None else result.summary.body_names.index(follow)
     sticks = sticks_of(result, model, still=still)
     extent = sticks.extent(result, np.eye(3))
     camera = camera_of(view, extent)
-    limits = with_margin(extent) if sticks.limits is None or fit else sticks.limits
-    seen = visible_rectangle(camera, limits, sticks.extent(result, camera.axes))
-    stage = Stage(sticks, camera, limits, seen, size, result.record.title)
+    is_free = sticks.limits is None or fit or about is not None
+    room = limits = with_margin(extent) if is_free else sticks.limits
+    if about is not None:
+        near = sticks.extent(result, np.eye(3), about)
+        room = with_margin(near)
+        limits[2] = extent[2] + (room - near)[2]  # the floor is as near as to a short motion
+    seen = visible_rectangle(camera, room, sticks.extent(result, camera.axes, about))
+    stage = Stage(sticks, camera, limits, seen, size, result.record.title, about)
     notes = () if sticks.shapes is None else sticks.shapes.notes
     return stage, (*notes, BEYOND) if leaves(limits, extent, camera) else notes
 
