@@ -24,6 +24,7 @@ from dap3d_core.model.state_layout import split
 from dap3d_core.result import Result, RunMetadata, find
 from dap3d_core.result.arrays import AXES
 from dap3d_core.result.errors import UnknownNameError, unknown
+from dap3d_core.result.note import information
 from dap3d_core.simulation.linearization.mode_motion import displaced_state
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint
 from dap3d_core.simulation.linearization.state_space import DriverRows, StateSpace
@@ -45,7 +46,7 @@ class Inputs:
         numbers: array of the evaluator and place in it, flat, of the number that an input is; None
             of factors and drivers.
         factors: names of the forces of which an input is a factor.
-        notes: of inputs that have no effect.
+        notes: of inputs that have no effect, and of those that are accelerations.
     """
 
     wrench: Floats
@@ -85,6 +86,7 @@ def inputs_of(point: OperatingPoint, names: Sequence[str]) -> Inputs:
             elif element not in point.model.force_names:
                 drivers.append((k, _driver(point, evaluator, name)))
                 numbers.append(None)
+                notes.append(information(f"input {name} is the acceleration of this driver"))
                 units.append("SI")
                 continue
             else:

@@ -296,6 +296,7 @@ def test_driver_as_input(level, sense):
     fields = {"function": scene.add_function("a", "rest", coeff=[0.0, 0.0, 0.0])}
     scene.add_joint(level, "drive", body_i="cart", a_j="ground.x", **fields)
     lin = dap.linearize(scene, inputs=("drive",), outputs=("bob.w.y", "cart.r.x", "drive.force.x"))
+    assert any("input drive is the acceleration" in note for note in lin.notes)
     s = 0.4 + 1.7j
     phi = sense * 0.5 / (0.27 * s**2 + 0.5 * 9.81)
     expected = [s * phi, sense / s**2, sense * 3.0 - 0.5 * phi * s**2]
