@@ -46,7 +46,7 @@ def test_an_empty_column_breaks_no_other(capsys):
 
 
 def test_a_table_without_room_for_its_words_is_a_list_of_facts_for_each_row(monkeypatch, capsys):
-    """Numbers and words stay whole; a blank line divides the rows, and what is empty is left out."""
+    """Numbers and words stay whole; a blank line divides the rows, what is empty is left out."""
     rows = [("parameters.stiffness", "0.18095", "soft"), ("mass", "-10.4", "")]
     for columns, wanted in [
         ("37", ["  by                      slope", "  parameters.stiffness  0.18095  soft",

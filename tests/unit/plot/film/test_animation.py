@@ -200,7 +200,7 @@ def test_a_body_that_is_followed_stays_where_it_is_while_the_axes_pass(tmp_path)
     assert not (frames[1][:, :40] == frames[2][:, :40]).all()  # numbers of the axis
     colourful = np.argwhere(np.ptp(frames[0], axis=-1) > 60)
     assert np.ptp(colourful, axis=0).max() > 100  # the two, 1 m apart, fill it
-    with pytest.raises(UnknownNameError, match="no body 'cra'.*did you mean 'car'"):
+    with pytest.raises(UnknownNameError, match=r"no body 'cra'.*did you mean 'car'"):
         dap.animate(dap.simulate(scene, t_end=0.1), tmp_path / "b.gif", follow="cra")
 
 
