@@ -231,8 +231,10 @@ def _stage_of(
     sticks = sticks_of(result, model, still=still)
     extent = sticks.extent(result, np.eye(3))
     camera = camera_of(view, extent)
-    is_free = sticks.limits is None or fit or about is not None
-    room = limits = with_margin(extent) if is_free else sticks.limits
+    limits = sticks.limits
+    if limits is None or fit or about is not None:
+        limits = with_margin(extent)
+    room = limits
     if about is not None:
         near = sticks.extent(result, np.eye(3), about)
         room = with_margin(near)

@@ -67,7 +67,8 @@ def inputs_of(point: OperatingPoint, names: Sequence[str]) -> Inputs:
     """
     wrench = np.zeros((6 * point.model.body_count, len(names)))
     rate = np.zeros((point.model.state_count, len(names)))
-    units, notes = [], []
+    units: list[str] = []
+    notes: list[str] = []
     numbers: list[tuple[str, int] | None] = []
     drivers, read, last = [], [], []  # places of inputs with the rows that they move
     with point.compiled.borrow_evaluator() as evaluator:
