@@ -166,15 +166,13 @@ def animate(
 ) -> Film:
     """Draw the motion of a result as a stick figure into a file; needs no display.
 
-    Bodies with shapes are drawn by them, others by lines from their mass centres to their points;
-    springs are dashed, points that a joint keeps apart (a massless link) joined by a thin line.
+    Bodies with shapes are drawn by them, others by lines from their mass centres to their points.
 
     Args:
         result: the result.
         path: the file: .gif; .mp4, which needs ffmpeg; .png, .svg or .pdf for a snapshot.
         fps: pictures a second, 1 to 50 for a GIF, to 240 for an MP4.
-        speed: simulated seconds in a second of the film; by default 1 for motions of 2 s to 10 s,
-            else such that the film lasts some 5 s. The film shows it.
+        speed: simulated seconds in one of the film; by default 1, or such that it lasts some 5 s.
         size: width and height, pixels; a height of 0 becomes one that suits the motion.
         view: "x", "y" or "z" looks along that axis, "AZIMUTH,ELEVATION" from there (degrees); by
             default along the axis across a plane motion, else from the side and above.
@@ -186,15 +184,13 @@ def animate(
         force: overwrites an existing file.
 
     Raises:
-        ValueError: no instants; an invalid suffix, number or view.
+        ValueError, UnknownNameError: no instants; an invalid suffix, number, view or body.
         ResultError: the file cannot be written, or exists and ``force`` is off; no ffmpeg.
-        UnknownNameError: there is no such body.
     """
     target = Path(path)
     suffix = target.suffix.lower()
     _check(result, target, fps, speed, size, at)
-    is_still = suffix not in FILMS
-    stage, notes = _stage_of(result, view, size, model, follow, fit=fit, still=is_still)
+    stage, notes = _stage_of(result, view, size, model, follow, fit=fit, still=suffix not in FILMS)
     duration = float(result.t[-1] - result.t[0])
     speed, times = speed or usual_speed(duration), np.array([result.t[0] if at is None else at])
     if suffix in FILMS:
