@@ -135,6 +135,8 @@ def main():
     data = json.loads((HERE / "results.json").read_text())
     PAGE.write_text(filled(PAGE.read_text(), data))
     figures.work_precision(data["cells"], DOCS / "peers-precision.svg")
+    glance = DOCS.parent / "pictures" / "peers.svg"
+    figures.work_precision(data["cells"], glance, figures.GLANCE)
     figures.growth(data["cells"], DOCS / "peers-growth.svg")
     beside = json.loads(touching.RESULTS.read_text())
     figures.contacts(touching.ladders(beside["rows"]), DOCS / "peers-contacts.svg")

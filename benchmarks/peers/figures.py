@@ -19,6 +19,8 @@ LOOK = {
 }
 PANELS = ("free-body-1", "heavy-top-1", "spherical-chain-8", "spherical-chain-64",
           "revolute-chain-8", "four-bar-1")  # fmt: skip
+#: Those of the README, in one row: a top, a long chain, a closed loop.
+GLANCE = ("heavy-top-1", "revolute-chain-64", "four-bar-1")
 SETTINGS = {
     "svg.hashsalt": "dap3d",  # equal data give equal files
     "svg.fonttype": "none",
@@ -50,12 +52,15 @@ def _line(axes, program, x, y):
     axes.plot(x, y, color=colour, marker=marker, markersize=4, linewidth=1.2, label=program)
 
 
-def work_precision(cells, path):
+def work_precision(cells, path, panels=PANELS):
     """One panel a scene: error of the best settings of each program against time."""
     there = {cell["scene"] for cell in cells}
-    scenes = [scene for scene in PANELS if scene in there]
+    scenes = [scene for scene in panels if scene in there]
     with pyplot.rc_context(SETTINGS):
-        figure, rows = pyplot.subplots(2, 3, figsize=(10, 6), layout="constrained", squeeze=False)
+        count = len(panels) // 3
+        figure, rows = pyplot.subplots(
+            count, 3, figsize=(10, 3 * count), layout="constrained", squeeze=False
+        )
         for axes, scene in zip(rows.flat, scenes, strict=False):
             unit = levels.best(cells, scene, levels.OURS, 1e-6)[0]
             for program in levels.PROGRAMS:
@@ -66,7 +71,7 @@ def work_precision(cells, path):
         for axes in rows.flat[len(scenes) :]:
             axes.set_visible(False)
         figure.supxlabel("time / dap3d's time to 1e-6")
-        figure.supylabel("largest error of a position at the end, m")
+        figure.supylabel("largest error of a position at the end, m" if count > 1 else "error, m")
         handles, labels = rows.flat[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=5, frameon=False)
         figure.savefig(path, metadata={"Date": None})

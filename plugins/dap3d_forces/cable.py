@@ -18,9 +18,10 @@ class ElasticCable(Force):
         force T p_k at point k, p_k = u_k - u_(k-1) of the unit vectors u_k along the spans
 
     L is ``length``; left out it is that of the start, and f is counted from f(0). A growing f pays
-    out; an ``input``, m, held between settings, takes its place, with the rate zero. With ``slack``
-    T = 0 where x < 0 or the sum is negative: a cable does not push. Without, it is taut, of a
-    pretension that the model must keep: T may be negative. Of constant length: joint ``cable``.
+    out; an ``input``, m, held between settings, takes its place, with the rate zero. T = 0 where
+    x < 0 or the sum is negative: a cable becomes slack, and does not push. With slack = false T may
+    be negative: one of a pretension, which what the model leaves out keeps taut. Of constant
+    length: joint ``cable``.
     """
 
     keyword = "cable"
@@ -31,7 +32,7 @@ class ElasticCable(Force):
     )
     k: float = number(unit="N/m", minimum=0.0, doc="stiffness of the whole cable")
     c: float = number(default=0.0, unit="N s/m", minimum=0.0, doc="damping coefficient")
-    slack: bool = choice((False, True), False, doc="the cable becomes slack, and does not push")
+    slack: bool = choice((False, True), True, doc="the cable becomes slack, and does not push")
     function: str = function(doc="m, by which the cable is longer, as a function of time")
     input: str = input_(instead_of="function", unit="m", doc="by which the cable is longer")
 

@@ -74,7 +74,8 @@ def test_by_a_point_in_a_list(keyword):
     scene = oscillator()
     scene.forces.clear()
     scene.add_point("end", "ground", (0.0, 0.0, 0.0))
-    scene.add_force(keyword, "spring", points=["mass.O", "end"], k=40.0, length=1.0, c=0.8)
+    fields = {"k": 40.0, "length": 1.0, "c": 0.8, "slack": False}
+    scene.add_force(keyword, "spring", points=["mass.O", "end"], **fields)
     values = (2.0, 40.0, 0.8, 1.0)
 
     def motion(t, q):

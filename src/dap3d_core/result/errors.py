@@ -38,7 +38,8 @@ def unknown(what: str, name: str, known: Collection[str]) -> UnknownNameError:
     if not known:
         message += f": the scene has no {what}"
     elif len(known) <= LISTED:
-        message += f" ({what}s: {', '.join(known)})"
+        several = f"{what[:-1]}ies" if what.endswith("y") else f"{what}s"
+        message += f" ({several}: {', '.join(known)})"
     return UnknownNameError(message, nearest(name, known))
 
 

@@ -41,6 +41,7 @@ def scene():
     scene.add_force("ptp", "spring", P_i="A", P_j="ground.O", k=10)
     scene.add_force("weight", "g")
     scene.add_function("a", "motor", coeff=(1.0, 3.0, 0.0))
+    scene.add_input("torque", 0.5)
     scene.add_shape("sphere", "ball", body="rod", radius=0.1)
     return scene
 
@@ -106,6 +107,7 @@ def test_two_components_of_what_the_scene_leaves_open(scene, checked):
         ("rod.mass", "did you mean 'bodies.rod.mass'"),
         ("body.rod.mass", "did you mean 'bodies.rod.mass'"),
         ("t_end", "did you mean 'simulation.t_end'"),
+        ("torque", "did you mean 'inputs.torque.value'"),
         ("simulation.method", "simulation has no number 'method'"),
         ("bodies", "this is a table"),
         ("bodies.rod", "no single number; it has bodies.rod.mass, bodies.rod.Jp, bodies.rod.r"),

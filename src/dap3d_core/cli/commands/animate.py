@@ -27,6 +27,7 @@ from dap3d_core.cli.process.exit_codes import DONE, Refused, refusing
     click.option("--at", type=float, metavar="S", help="Time of a snapshot in s."),
     click.option("--fit", is_flag=True,
                  help="Frame the whole motion, whatever limits the scene gives."),
+    click.option("--follow", metavar="BODY", help="A body that stays in its place of the picture."),
     click.option("--model", metavar="MODEL", help="The model in whose folder meshes lie."),
     options.FORCE, options.JSON, options.QUIET,
     saves=True,
@@ -51,6 +52,7 @@ def animate(
     from dap3d_core.cli.console.progress import counting
     from dap3d_core.cli.framework.paths import open_result, output_path, writable
     from dap3d_core.plot import animate as draw
+    from dap3d_core.result import UnknownNameError
 
     opened = open_result(result)
     target = output_path(result, output, ".gif" if len(opened.t) > 1 else ".png")
@@ -58,7 +60,7 @@ def animate(
     if size is not None:
         options["size"] = _size(size)
     writable(target, force=force, sources=(Path(result),))
-    with counting("frame") as progress, refusing(ValueError):
+    with counting("frame") as progress, refusing(ValueError, UnknownNameError):
         film = draw(opened, target, progress=progress, fit=fit, force=force, **options)
     width, height = film.size
     contents = f"{width} x {height}, {count(film.frames, 'frame')}"

@@ -166,7 +166,7 @@ def _show(console: "Terminal", report: "Report") -> None:
         for o in report.outcomes:
             errors = ("" if x is None else f"{x:.0e}" for x in (o.error, o.differences))
             rows.append((Text(*STATES[o.state]), o.title, *errors, o.words))
-        columns = ("", "check", "error", "by diff.", "what was compared; why it does not apply")
+        columns = ("", "check", "error", "by diff.", "compared; or why not")
         console.table(columns, rows, fixed=(0, 2, 3))
         console.items(dict.fromkeys(f"{o.title}: {n}" for o in report.outcomes for n in o.notes))
         console.items(map(str, report.motions))

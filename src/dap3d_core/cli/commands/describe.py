@@ -107,6 +107,7 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
     type_info = registry.get(kind, keyword)
     type_: Any = type_info.type
     source = registry.sources_of(kind, keyword)[0]
+    specs = specs_of(type_)
     return {
         "kind": kind,
         "keyword": keyword,
@@ -127,9 +128,9 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
                 "default": None if spec.required else spec.default,
                 "unit": spec.unit,
                 "doc": spec.doc,
-                "allowed": _allowed(spec),
+                "allowed": _allowed(spec, specs),
             }
-            for name, spec in specs_of(type_).items()
+            for name, spec in specs.items()
             if spec.given
         ],
         "names": list(map(_name_data, type_info.names.values())),
@@ -198,8 +199,8 @@ def _source(kernel: Any) -> str:
     return textwrap.dedent(text).rstrip()
 
 
-def _allowed(spec: Any) -> str:
-    """The conditions on a value besides its kind."""
+def _allowed(spec: Any, specs: Mapping[str, Any]) -> str:
+    """The conditions on a value besides its kind, or what stands in its place."""
     bounds = {">": 0.0 if spec.positive else None, ">=": spec.minimum, "<=": spec.maximum}
     usual = _bounds({">=": spec.usual[0], "<=": spec.usual[1]})
     words = [f"of {spec.argument}"] if spec.argument else []
@@ -216,6 +217,7 @@ def _allowed(spec: Any) -> str:
         if isinstance(spec.direction, tuple):
             words[-1] += f" at the start, where one of {', '.join(spec.direction)} is given"
     words += [f"not along {spec.across}"] * bool(spec.across)
+    words += ["or P_i and P_j in its place"] * (spec.kind == "vector2" and "P_i" not in specs)
     return ", ".join(words)
 
 

@@ -26,7 +26,7 @@ LISTED = 10
     options.MODEL,
     click.option("--input", "inputs", multiple=True, required=True, metavar="NAME",
                  help="What oscillates: an input of the scene, a force or a number of one "
-                      "(push.f.x), a driver. As often as wanted."),
+                      "(push.f.x), the acceleration of a driver. As often as wanted."),
     click.option("--output", "outputs", multiple=True, required=True, metavar="QUANTITY",
                  help="What answers: a quantity of results, as often as wanted."),
     click.option("--at", "start", metavar="RESULT[@TIME]",
@@ -60,8 +60,8 @@ def response(
     Gains are in units of the output over those of the input. A phase below zero lags.
 
     \b
-    dap3d response car --input road.f --output body.r.z
-    dap3d response car --input road.f --output body.r.z --from 0.1 --to 100 -o bode.png
+    dap3d response car --input engine.f.z --output body.r.z
+    dap3d response car --input road --output body.rdd.z --from 0.1 --to 100 -o bode.png
     """
     import dap3d_core as dap
     from dap3d_core.cli.commands.modes import state_of

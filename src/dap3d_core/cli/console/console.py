@@ -154,18 +154,25 @@ class Terminal(Console):
 
         Columns ``right`` are aligned to the right; columns ``fixed`` are broken into lines only if
         no other column can be. Columns without a word, beside which others would be broken, are
-        left out.
+        left out. Where words or numbers would be broken all the same, each row is a list of facts.
         """
         rows = list(rows)
         kept = [k for k, name in enumerate(columns) if name or any(row[k] for row in rows)]
         grid = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="cyan")
         for k in kept:
             justify: Any = "right" if k in right else "left"
-            grid.add_column(columns[k], justify=justify, no_wrap=k in fixed, overflow="fold")
+            whole = k in fixed or k in right or not any(" " in str(row[k]) for row in rows)
+            grid.add_column(columns[k], justify=justify, no_wrap=whole, overflow="fold")
         for row in rows:
             cells = (row[k] for k in kept)
             grid.add_row(*(Text(clean(c)) if isinstance(c, str) else c for c in cells))
-        self.show(_indented(grid, 2))
+        if self.measure(grid).minimum + 2 <= self.width:
+            self.show(_indented(grid, 2))
+            return
+        for number, row in enumerate(rows):
+            if number:
+                self.print()
+            self.facts((columns[k], str(row[k])) for k in kept)
 
 
 def _without_colors() -> bool | None:

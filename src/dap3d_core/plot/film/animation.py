@@ -27,6 +27,7 @@ from dap3d_core.plot.film.projection import (
 from dap3d_core.plot.film.stick_figure import pose_at, sticks_of
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result, ResultError
+from dap3d_core.result.errors import unknown
 from dap3d_core.result.file.atomic_write import cannot, whole_file
 
 #: Pixels; a height of 0 becomes one that suits the motion.
@@ -158,38 +159,38 @@ def animate(
     view: str | None = None,
     at: float | None = None,
     fit: bool = False,
+    follow: str | None = None,
     model: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
     force: bool = False,
 ) -> Film:
     """Draw the motion of a result as a stick figure into a file; needs no display.
 
-    Bodies with shapes are drawn by them, others by lines from their mass centres to their points;
-    springs are dashed, points that a joint keeps apart (a massless link) joined by a thin line.
+    Bodies with shapes are drawn by them, others by lines from their mass centres to their points.
 
     Args:
         result: the result.
         path: the file: .gif; .mp4, which needs ffmpeg; .png, .svg or .pdf for a snapshot.
         fps: pictures a second, 1 to 50 for a GIF, to 240 for an MP4.
-        speed: simulated seconds in a second of the film; by default 1 for motions of 2 s to 10 s,
-            else such that the film lasts some 5 s. The film shows it.
+        speed: simulated seconds in one of the film; by default 1, or such that it lasts some 5 s.
         size: width and height, pixels; a height of 0 becomes one that suits the motion.
         view: "x", "y" or "z" looks along that axis, "AZIMUTH,ELEVATION" from there (degrees); by
             default along the axis across a plane motion, else from the side and above.
         at: time of a snapshot, s; by default the first instant.
         fit: frame the whole motion, whatever limits the scene's [animation] gives.
+        follow: a body that stays in its place of the picture; what else moves is seen from there.
         model: the model (a name, a folder, a file) in whose folder meshes of shapes lie.
         progress: called as progress(done, frames).
         force: overwrites an existing file.
 
     Raises:
-        ValueError: no instants; an invalid suffix, number or view.
+        ValueError, UnknownNameError: no instants; an invalid suffix, number, view or body.
         ResultError: the file cannot be written, or exists and ``force`` is off; no ffmpeg.
     """
     target = Path(path)
     suffix = target.suffix.lower()
     _check(result, target, fps, speed, size, at)
-    stage, notes = _stage_of(result, view, size, model, fit=fit, still=suffix not in FILMS)
+    stage, notes = _stage_of(result, view, size, model, follow, fit=fit, still=suffix not in FILMS)
     duration = float(result.t[-1] - result.t[0])
     speed, times = speed or usual_speed(duration), np.array([result.t[0] if at is None else at])
     if suffix in FILMS:
@@ -214,17 +215,28 @@ def _stage_of(
     view: str | None,
     size: tuple[int, int],
     model: str | os.PathLike[str] | None,
+    follow: str | None,
     *,
     fit: bool,
     still: bool,
 ) -> tuple[Stage, tuple[str, ...]]:
     """The stage, and notes on what it shows."""
+    if follow is not None and follow not in result.summary.body_names:
+        raise unknown("body", follow, result.summary.body_names)
+    about = None if follow is None else result.summary.body_names.index(follow)
     sticks = sticks_of(result, model, still=still)
     extent = sticks.extent(result, np.eye(3))
     camera = camera_of(view, extent)
-    limits = with_margin(extent) if sticks.limits is None or fit else sticks.limits
-    seen = visible_rectangle(camera, limits, sticks.extent(result, camera.axes))
-    stage = Stage(sticks, camera, limits, seen, size, result.record.title)
+    limits = sticks.limits
+    if limits is None or fit or about is not None:
+        limits = with_margin(extent)
+    room = limits
+    if about is not None:
+        near = sticks.extent(result, np.eye(3), about)
+        room = with_margin(near)
+        limits[2] = extent[2] + (room - near)[2]  # the floor is as near as to a short motion
+    seen = visible_rectangle(camera, room, sticks.extent(result, camera.axes, about))
+    stage = Stage(sticks, camera, limits, seen, size, result.record.title, about)
     notes = () if sticks.shapes is None else sticks.shapes.notes
     return stage, (*notes, BEYOND) if leaves(limits, extent, camera) else notes
 

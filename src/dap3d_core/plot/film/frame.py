@@ -46,6 +46,7 @@ class Stage:
         shown: (2, 2) visible rectangle, in the axes of the picture, m.
         size: width and height, pixels; a height of 0 becomes one that suits the motion.
         title: text in the upper left corner.
+        about: body, from 0, from whose mass centre the visible rectangle is measured, or None.
     """
 
     def __init__(
@@ -56,8 +57,10 @@ class Stage:
         shown: Floats,
         size: tuple[int, int],
         title: str,
+        about: int | None = None,
     ) -> None:
         self.sticks, self.camera, self.limits = sticks, camera, limits
+        self._about = about
         self._few = len(sticks.names) <= MOST_NAMES
         shaped = sticks.shapes.hues if sticks.shapes is not None else {}
         self._bare = np.array([k not in shaped for k in range(1, len(sticks.names) + 1)], bool)
@@ -120,6 +123,10 @@ class Stage:
             every = np.concatenate([lines, sticks.links, sticks.springs])
             self._shadows.set_segments(list(self.camera.project(on_floor)[every]))
         self._time.set_text(clock)
+        if self._about is not None:
+            (x, y), (x0, x1), (y0, y1) = self.camera.project(r[self._about]), *self._window
+            self.ax.set(xlim=(x0 + x, x1 + x), ylim=(y0 + y, y1 + y))
+            self._still = None  # what does not move does so in the picture
 
     def _fit_markers(self, centres: Floats) -> None:
         """Shrink markers to the usual distance of mass centres in the first picture."""
@@ -159,7 +166,7 @@ class Stage:
         self.figure.set_figheight(height)
         high = max(0.3, height - TOP - below)
         ax = self.figure.add_axes((left / WIDTH, below / height, wide / WIDTH, high / height))
-        (x0, x1), (y0, y1) = fill_limits(shown, wide, high)
+        self._window = (x0, x1), (y0, y1) = fill_limits(shown, wide, high)
         ax.set_xlim(x0, x1)
         ax.set_ylim(y0, y1)
         if plane:
@@ -182,7 +189,10 @@ class Stage:
     def _draw_floor(self) -> None:
         """The grid on the floor, the text of its spacing, and the directions of the axes."""
         # some four to ten lines
-        spacing = round_number(float(np.max(self.limits[:2, 1] - self.limits[:2, 0])) / 6.0)
+        size = float(np.max(self.limits[:2, 1] - self.limits[:2, 0]))
+        if self._about is not None:
+            size = self._window[0][1] - self._window[0][0]
+        spacing = round_number(size / 6.0)
         lines = self.camera.project(floor_grid(self.limits, spacing))
         self.ax.add_collection(
             LineCollection(list(lines), colors=GRID, linewidths=0.7, zorder=0), autolim=False

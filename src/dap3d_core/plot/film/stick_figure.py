@@ -103,19 +103,23 @@ class Sticks:
         body = np.concatenate([self.body, self.shapes.body[ends]])
         return attrs.evolve(self, body=body, local=np.vstack([self.local, self.shapes.local[ends]]))
 
-    def extent(self, result: Result, directions: Floats) -> Floats:
+    def extent(self, result: Result, directions: Floats, about: int | None = None) -> Floats:
         """(d, 2) least and largest of all places over the reported instants, m.
 
         Args:
             result: whose motion.
             directions: (3, d) unit vectors along which they are measured.
+            about: body, from 0, from whose mass centre those of bodies are measured.
         """
         found = []
         framed = self._framed
         step = max(1, BLOCK // (3 * len(framed.body)))
         for start in range(0, len(result.t), step):
             r, p, _, _ = split(result.u[start : start + step])
-            all_of_them = framed.positions(r, p).reshape(-1, 3) @ directions
+            places = framed.positions(r, p)
+            if about is not None:
+                places = places[:, framed.body > 0] - r[:, [about]]
+            all_of_them = places.reshape(-1, 3) @ directions
             found.append([all_of_them.min(axis=0), all_of_them.max(axis=0)])
         return np.stack([np.min(found, axis=(0, 1)), np.max(found, axis=(0, 1))], axis=1)
 

@@ -191,6 +191,7 @@ class ContactJumps(Jumps):
         if len(latest) < MOST_CHANGES or passed > within * self._span_of(integration):
             return
         every = sorted({name for _, some in latest for name in some.split(", ")})
+        self._refuse_overlap(integration, every)
         start = f"the run stopped at t = {t:.9g} s: contacts {', '.join(every)}"
         if jams > MOST_JAMS:
             raise SimulationError(
@@ -203,6 +204,20 @@ class ContactJumps(Jumps):
             "of these contacts ends bounces sooner (e = 0: at once); or end the run by an event "
             "before"
         )
+
+    def _refuse_overlap(self, integration: Integration, names: list[str]) -> None:
+        """SimulationError where bodies came behind a surface past its end, which lies in them."""
+        table, t = self.table, integration.t
+        outputs = table.outputs(t, self._state_of(integration))
+        depth = np.where(outputs[:, REACH] < 0.0, 0.0, -outputs[:, GAP])
+        for c in np.flatnonzero(depth > TOUCHING_AT_START * table.length).tolist():
+            if table.names[c] in names:
+                raise SimulationError(
+                    f"the run stopped at t = {t:.9g} s: contact {table.names[c]} begins where its "
+                    f"bodies overlap by {depth[c]:.3g} m: they came past an end of its surface, "
+                    "beyond which nothing touches. Let the surface begin before that, or give its "
+                    "end a contact of its own (ball_ball, whose radius_i is 0 of an edge)"
+                )
 
     def notes(self, integration: Integration) -> list[str]:
         """Notes where impacts gave energy, and where more happened than is kept."""

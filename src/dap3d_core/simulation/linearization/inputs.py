@@ -24,6 +24,7 @@ from dap3d_core.model.state_layout import split
 from dap3d_core.result import Result, RunMetadata, find
 from dap3d_core.result.arrays import AXES
 from dap3d_core.result.errors import UnknownNameError, unknown
+from dap3d_core.result.note import information
 from dap3d_core.simulation.linearization.mode_motion import displaced_state
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint
 from dap3d_core.simulation.linearization.state_space import DriverRows, StateSpace
@@ -45,7 +46,7 @@ class Inputs:
         numbers: array of the evaluator and place in it, flat, of the number that an input is; None
             of factors and drivers.
         factors: names of the forces of which an input is a factor.
-        notes: of inputs that have no effect.
+        notes: of inputs that have no effect, and of those that are accelerations.
     """
 
     wrench: Floats
@@ -66,7 +67,8 @@ def inputs_of(point: OperatingPoint, names: Sequence[str]) -> Inputs:
     """
     wrench = np.zeros((6 * point.model.body_count, len(names)))
     rate = np.zeros((point.model.state_count, len(names)))
-    units, notes = [], []
+    units: list[str] = []
+    notes: list[str] = []
     numbers: list[tuple[str, int] | None] = []
     drivers, read, last = [], [], []  # places of inputs with the rows that they move
     with point.compiled.borrow_evaluator() as evaluator:
@@ -85,6 +87,7 @@ def inputs_of(point: OperatingPoint, names: Sequence[str]) -> Inputs:
             elif element not in point.model.force_names:
                 drivers.append((k, _driver(point, evaluator, name)))
                 numbers.append(None)
+                notes.append(information(f"input {name} is the acceleration of this driver"))
                 units.append("SI")
                 continue
             else:
@@ -201,9 +204,10 @@ def _driver(point: OperatingPoint, evaluator: Evaluator, name: str) -> list[Floa
             column[start : start + len(slope)] = slope
             result.append(column)
         return result
-    known, element = _inputs_known(point, evaluator), name.partition(".")[0]
+    known = _inputs_known(point, evaluator)
+    element = name.removeprefix("inputs.").partition(".")[0]  # sweeps say inputs.NAME.value
     if element in known:
-        raise UnknownNameError(f"input {name!r}: a driver is an input as a whole; name {element}")
+        raise UnknownNameError(f"input {name!r}: {element} is an input as a whole; name {element}")
     raise unknown("input, force or driver", element, known)
 
 

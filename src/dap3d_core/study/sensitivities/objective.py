@@ -68,6 +68,9 @@ class Objective:
         self.x0 = np.array([float(p.value or 0.0) for p in self._parameters])
         self.runs = self.gradients = 0
 
+    def __repr__(self) -> str:
+        return f"<Objective by {', '.join(self.names)} of {self._scene!r}>"
+
     def __call__(self, x: ArrayLike) -> float:
         """The value at a point x (p,). Errors as of ``simulate``."""
         self.runs += 1

@@ -78,6 +78,9 @@ class Sensitivities:
         }
         self._known: dict[str, Floats] = {}
 
+    def __repr__(self) -> str:
+        return f"<Sensitivities by {', '.join(self.names)} of {self.result!r}>"
+
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the parameters."""

@@ -138,12 +138,16 @@ def test_a_required_function_is_in_the_example():
     ("keyword", "field", "allowed"),
     [
         ("ptp", "k", "usually >= 0"),
-        ("ptp", "d", "not of zero length at the start, where one of l0, f_a, function is given"),
+        (
+            "ptp", "d", "not of zero length at the start, where one of l0, f_a, function is given, "
+            "or P_i and P_j in its place",
+        ),
+        ("tran", "d", "or P_i and P_j in its place"),
         ("friction", "mu", ">= 0, usually <= 10"),
         ("rot_sda", "v_i", "not along axis"),
         ("weight", "wgt", "of unit length"),
     ],
-)
+)  # fmt: skip
 def test_what_a_field_asks_for(keyword, field, allowed):
     (type_,) = json.loads(described(keyword, "--json"))["types"]
     fields = {f["name"]: f for f in type_["fields"]}

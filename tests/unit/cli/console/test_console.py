@@ -45,6 +45,20 @@ def test_an_empty_column_breaks_no_other(capsys):
     ]  # fmt: skip
 
 
+def test_a_table_without_room_for_its_words_is_a_list_of_facts_for_each_row(monkeypatch, capsys):
+    """Numbers and words stay whole; a blank line divides the rows, what is empty is left out."""
+    rows = [("parameters.stiffness", "0.18095", "soft"), ("mass", "-10.4", "")]
+    for columns, wanted in [
+        ("37", ["  by                      slope", "  parameters.stiffness  0.18095  soft",
+                "  mass                    -10.4"]),
+        ("36", ["  by     parameters.stiffness", "  slope  0.18095", "         soft", "",
+                "  by     mass", "  slope  -10.4"]),
+    ]:  # fmt: skip
+        monkeypatch.setenv("COLUMNS", columns)
+        stdout().table(("by", "slope", ""), rows, right=(1,))
+        assert [line.rstrip() for line in capsys.readouterr().out.splitlines()] == wanted
+
+
 def test_lists_of_a_docstring_are_lists(monkeypatch, capsys):
     """Items keep their lines, wrapped below their text; equations and paragraphs as before."""
     monkeypatch.setenv("COLUMNS", "30")

@@ -16,7 +16,7 @@ from dap3d_core.plot.film.animation import frame_times, usual_speed
 from dap3d_core.plot.film.frame import Stage
 from dap3d_core.plot.film.projection import camera_of, visible_rectangle, with_margin
 from dap3d_core.plot.film.stick_figure import SHADES, pose_at, shapes_of, sticks_of
-from dap3d_core.result import ResultError
+from dap3d_core.result import ResultError, UnknownNameError
 from dap3d_core.scene import AnimationPoint
 
 
@@ -180,6 +180,28 @@ def test_what_is_drawn_is_where_the_body_is(result, tmp_path):
         extent = np.ptp(places, axis=0)  # from H, on the axis, to P
         scale = drawn.max() / extent.max()
         np.testing.assert_allclose(drawn, extent * scale, atol=22)  # the marker's size in pixels
+
+
+def test_a_body_that_is_followed_stays_where_it_is_while_the_axes_pass(tmp_path):
+    scene = dap.Scene(name="far")
+    scene.add_body("car", mass=1.0, Jp=[1, 1, 1], r_dot=[10.03, 2, 0], color="tab:orange")
+    scene.add_body("other", mass=1.0, Jp=[1, 1, 1], r=[0, 1, 0], r_dot=[10.03, 2, 0.1], color="b")
+    film = dap.animate(
+        dap.simulate(scene, t_end=2.0), tmp_path / "a.gif", follow="car", fps=1, view="z",
+        size=(400, 400),
+    )  # fmt: skip
+    with Image.open(film.path) as picture:
+        frames = []
+        for k in range(film.frames):
+            picture.seek(k)
+            frames.append(np.asarray(picture.convert("RGB"), dtype=float)[:340])
+    places = [np.argwhere(np.abs(f - [230, 159, 0]).max(axis=-1) < 60).mean(axis=0) for f in frames]
+    np.testing.assert_allclose(places, [places[0]] * 3, atol=0.6)  # pixels
+    assert not (frames[1][:, :40] == frames[2][:, :40]).all()  # numbers of the axis
+    colourful = np.argwhere(np.ptp(frames[0], axis=-1) > 60)
+    assert np.ptp(colourful, axis=0).max() > 100  # the two, 1 m apart, fill it
+    with pytest.raises(UnknownNameError, match=r"no body 'cra'.*did you mean 'car'"):
+        dap.animate(dap.simulate(scene, t_end=0.1), tmp_path / "b.gif", follow="cra")
 
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"

@@ -53,6 +53,17 @@ def test_a_driver_that_goes_on_into_a_limit_is_named_with_the_contact():
         dap.simulate(scene, t_end=1.0)
 
 
+def test_a_body_behind_a_surface_that_begins_in_it_is_named_with_the_depth():
+    scene = dap.Scene(name="under a shelf")
+    scene.add_body("ball", mass=1.0, r=(-0.5, -0.2, 0.0), r_dot=(1.0, 0.0, 0.0))
+    scene.add_function("a", "x", coeff=(0.0, 1.0, 0.0))
+    scene.add_function("a", "y", coeff=(0.0, 0.0, 0.0))
+    edge = {"x": "x", "y": "y", "s_min": 0.0, "s_max": 1.0}
+    scene.add_contact("point_curve", "shelf", P_i="ball.O", **edge)
+    with pytest.raises(dap.SimulationError, match=r"t = 0\.5 s: contact shelf.*overlap by 0\.2 m"):
+        dap.simulate(scene, t_end=1.0)
+
+
 @pytest.mark.parametrize("height", [0.2, -0.05])
 def test_bodies_are_moved_until_they_touch(height):
     result = dap.simulate(bouncing(height=height, touch=True), t_end=0.1, dt=0.05)

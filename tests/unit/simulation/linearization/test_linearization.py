@@ -178,6 +178,7 @@ def test_equilibrium_is_at_rest():
         ),
         ({"inputs": ("rub",)}, r"rub acts by reactions of joints alone"),
         ({"inputs": ("rail.k",)}, r"no input, force or driver 'rail'"),
+        ({"inputs": ("inputs.pull.value",)}, r"an input as a whole; name pull$"),
         ({"outputs": ("cart.r.y_",)}, r"did you mean 'cart\.r\.[xyz]'"),
         ({"outputs": ("cart.r",)}, r"has components: name one, as cart\.r\.x"),
         ({"inputs": ("spring",), "outputs": ("spring.tension",)}, "a factor of which is an input"),
@@ -189,6 +190,7 @@ def test_unknown_names(settings, words):
     scene = cart()
     scene.add_force("rot_sda", "twist", v_i="bob.x", v_j="cart.x", axis="bob.y", k=1.0)
     scene.add_force("friction", "rub", joint="rail", mu=0.1, v_tol=1.0)
+    scene.add_input("pull", 0.0)
     with pytest.raises(UnknownNameError, match=words):
         dap.linearize(scene, **settings)
 
@@ -294,6 +296,7 @@ def test_driver_as_input(level, sense):
     fields = {"function": scene.add_function("a", "rest", coeff=[0.0, 0.0, 0.0])}
     scene.add_joint(level, "drive", body_i="cart", a_j="ground.x", **fields)
     lin = dap.linearize(scene, inputs=("drive",), outputs=("bob.w.y", "cart.r.x", "drive.force.x"))
+    assert any("input drive is the acceleration" in note for note in lin.notes)
     s = 0.4 + 1.7j
     phi = sense * 0.5 / (0.27 * s**2 + 0.5 * 9.81)
     expected = [s * phi, sense / s**2, sense * 3.0 - 0.5 * phi * s**2]

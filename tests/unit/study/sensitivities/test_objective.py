@@ -29,6 +29,7 @@ def test_gradients_are_those_of_differences(number):
     f = dap.objective(
         oscillator(), ["forces.spring.k", "forces.spring.c"], f"mass.r.x**2:{number}", **SETTINGS
     )
+    assert repr(f).startswith("<Objective by forces.spring.k, forces.spring.c of <Scene")
     value, gradient = f.value_and_gradient(f.x0)
     assert value == f(f.x0)
     h = 1e-3

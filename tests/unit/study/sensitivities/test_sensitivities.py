@@ -155,6 +155,7 @@ def test_a_break_point_that_depends_on_a_parameter():
 
 def test_data_sets(tmp_path):
     s = dap.sensitivities("pen2", BY, **SHORT)
+    assert repr(s).startswith(f"<Sensitivities by {', '.join(BY)} of <Result 'pen2': done")
     data = s.to_xarray()
     np.testing.assert_array_equal(data["d cylinder.r"].values, s.of("cylinder.r"))
     assert list(data.parameter.values) == BY
