@@ -22,7 +22,9 @@ from dap3d_core.study.sensitivities.neighbours import (
 )
 
 #: Part of a run by which a state lies before the jump of a switch.
-BEFORE_JUMP = 1e-9
+BEFORE_JUMP = 1e-12
+#: Derivative of a slip, over the largest one of the state, that is rounding.
+NO_SLIP = 1e-9
 
 
 class DifferentiatedRun(Run):
@@ -139,28 +141,11 @@ class DifferentiatedRun(Run):
         assert of is not None
 
         def jump(integration: Integration) -> None:
-            work = integration.work
-            present = [(name, array.copy()) for name, array in arrays_of(self)]
+            work, put = integration.work, self._putting()
+            given = np.append(work.state[Y], work.t)
             of_time = self._slopes_of(work.real)[work.indices("real")["t"]].copy()
             of_state = self._slopes_of(work.state)[: work.state.shape[1]].copy()
-            given = np.append(work.state[Y], work.t)
-            system = {
-                name: self._slopes_of(array).copy()
-                for name, array in arrays_of(self)
-                if array.dtype.kind == "f" and not name.startswith("0.") and array.size
-            }
-
-            def put(run: Run) -> None:
-                arrays = dict(arrays_of(run))
-                offset, j = self._offset_of(run)
-                for name, array in present:
-                    arrays[name][...] = array
-                    if offset and name in system:
-                        arrays[name] += offset * system[name][:, j].reshape(array.shape)
-
-            late = self._slopes_of(work.switches).reshape(*work.switches.shape, -1)[CROSSED]
-            if np.isnan(late).any():
-                k = int(np.flatnonzero(np.isnan(late).any(axis=1))[0])
+            if (k := self._jumped_switch()) >= 0:
                 rates = self._rates_before(put, given)
                 late = self._slopes_of_jump(k, put, rates, given, np.vstack([of_state, of_time]))
                 of_state, of_time = of_state + np.outer(rates, late), of_time + late
@@ -187,12 +172,77 @@ class DifferentiatedRun(Run):
             if np.isnan(slopes).any():
                 what = f"there is no derivative of what happens at t = {work.t:.9g} s"
                 raise SimulationError(f"{what}: {failures[-1]}") from failures[-1]
+            if change is type(of).begin:
+                self._refuse_slip_from_rest(put, slopes)
             self.instants[float(work.t)] = of_time
             self._differentiation.take()
             self._slopes_of(work.state)[: work.state.shape[1]] = slopes
             self._slopes_of(work.real)[work.indices("real")["t"]] = of_time
 
         return jump
+
+    def _putting(self) -> Callable[[Run], None]:
+        """What makes all numbers those of the present, in a run, with its parameter's change."""
+        present = [(name, array.copy()) for name, array in arrays_of(self)]
+        system = {
+            name: self._slopes_of(array).copy()
+            for name, array in arrays_of(self)
+            if array.dtype.kind == "f" and not name.startswith("0.") and array.size
+        }
+
+        def put(run: Run) -> None:
+            arrays = dict(arrays_of(run))
+            offset, j = self._offset_of(run)
+            for name, array in present:
+                arrays[name][...] = array
+                if offset and name in system:
+                    arrays[name] += offset * system[name][:, j].reshape(array.shape)
+
+        return put
+
+    def _jumped_switch(self) -> int:
+        """The switch that has jumped as it was crossed; -1 where none has."""
+        switches = self.present.work.switches
+        slopes = self._slopes_of(switches)[CROSSED * switches.shape[1] :][: switches.shape[1]]
+        found = np.flatnonzero(np.isnan(slopes).any(axis=1))
+        slopes[found] = 0.0
+        return int(found[0]) if len(found) else -1
+
+    def _refuse_slip_from_rest(self, put: Callable[[Run], None], slopes: Floats) -> None:
+        """Where a contact begins to slide from rest, the least slip decides in which direction.
+
+        Args:
+            put: as of ``_putting``, before velocities have jumped.
+            slopes: (size, p) derivatives of the state.
+
+        Raises:
+            SimulationError: a parameter gives it some.
+        """
+        of, y = self.jumps, self.present.work.state[Y].copy()
+        assert of is not None
+        sliding = of.sliding_from_rest(self.present)
+        if not sliding:
+            return
+
+        def slips(run: Run, state: Floats) -> Floats:
+            put(run)
+            run.present.work.state[Y] = state
+            return type(of)(run.evaluator).slips(run.present)[list(sliding.values())]
+
+        of_slips = np.abs(self._derivative(slips, y, slopes, slice(0, -1)))
+        largest = np.max(np.abs(slopes), axis=0, initial=0.0)
+        for name, moved in zip(sliding, of_slips, strict=True):
+            for neighbours, most, size in zip(
+                self.neighbours, np.max(moved, axis=0), largest, strict=True
+            ):
+                if most > NO_SLIP * size:
+                    raise SimulationError(
+                        f"there is no derivative by {neighbours.parameter.name}: contact {name} "
+                        "begins to slide from rest, and the least slip would decide in which "
+                        "direction; give it some at the start"
+                    )
+        put(self)
+        self.present.work.state[Y] = y
 
     def _name_of(self, switch: int) -> str:
         return self.evaluator.switches[switch].name(self.evaluator.model)
