@@ -29,7 +29,7 @@ BATCH, PATIENCE = 25, 300
 #: Targets of the coverage-guided fuzzer, which needs the extra "fuzz" (guided.py).
 GUIDED = ("scene-bytes", "matlab-bytes")
 HYPOTHESIS = ("scenes", "damaged", "matlab", "models", "results", "numbers", "quantities",
-              "expressions", "commands", "programs", "contacts")  # fmt: skip
+              "expressions", "commands", "programs", "contacts", "gradients")  # fmt: skip
 
 
 def keep(target, data, words, ending):

@@ -11,6 +11,8 @@ from fuzz.contacts import check_contacts
 from fuzz.contacts import numbers as numbers_of_contacts
 from fuzz.damage import damaged_scenes
 from fuzz.expressions import check_expression, expressions
+from fuzz.gradients import check_gradients
+from fuzz.gradients import numbers as numbers_of_gradients
 from fuzz.matlab import check_model, damaged_models
 from fuzz.models import check_model_file, damaged_model_files
 from fuzz.numbers import changes, check_change
@@ -77,5 +79,6 @@ TARGETS = {
         Target("commands", command_lines(), check_command, ".json"),
         Target("programs", sources(), check_program, ".py"),
         Target("contacts", numbers_of_contacts(), check_contacts, ".txt"),
+        Target("gradients", numbers_of_gradients(), check_gradients, ".txt"),
     )
 }

@@ -6,6 +6,7 @@ import importlib.util
 import pytest
 
 from fuzz.contacts import check_contacts
+from fuzz.gradients import check_gradients
 from fuzz.guided import GUIDED
 from fuzz.targets import TARGETS
 
@@ -22,6 +23,7 @@ COUNTS = {
     "commands": (3, 15),
     "programs": (3, 20),
     "contacts": (1, 10),
+    "gradients": (1, 5),
 }
 
 
@@ -62,6 +64,13 @@ def test_contacts_that_once_ended_falsely(number):
     joints hold it, or in a contact of no force that could not leave those that share.
     """
     assert check_contacts(str(number).encode()) == "done"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "ending"), [(19_565_458, "done"), (16_291_320, "refused")])
+def test_derivatives_that_once_were_wrong(number, ending):
+    """A ball that slides over the edge of a box, and a capsule that slides from rest."""
+    assert check_gradients(str(number).encode()) == ending
 
 
 @pytest.mark.every(4)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from fuzz.contacts import scene_of
 from verification.test_contacts import TIGHT, G, ball
 from verification.test_derivatives_of_runs import derivative
 from verification.test_sticking_under_load import wheel
@@ -207,3 +208,51 @@ def test_a_ball_that_bounces_to_rest_on_a_slope_by_its_tilt():
 
     assert found.result.r[-1, 0] == pytest.approx(place(0.3), abs=1e-9)
     assert found.final("ball.r")[:, 0] == pytest.approx(derivative(place, 0.3), rel=TOLERANCE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("integrator", ["dop853", "radau", "adams"])
+def test_a_ball_that_slides_over_an_edge_by_its_speed(integrator):
+    """It leaves the edge, x away, at t1 = x / v, and falls: z' = -g (t_end - t1) x / v^2.
+
+    The force ends there with a jump, at no zero of what decides it.
+    """
+    x, v, t_end = 0.15, 2.0, 0.2
+    scene = dap.Scene(name="edge")
+    scene.add_body("ball", mass=2.0, Jp=[0.01] * 3, r=[0.2 - x, 0.02, 0.15], r_dot=[v, 0.0, 0.0])
+    scene.add_force("weight", "g")
+    scene.add_contact("ball_box", "table", P_i="ball.O", P_j="ground.O", radius=0.1,
+                      size=[0.4, 0.4, 0.1])  # fmt: skip
+    settings = TIGHT | {"integrator": integrator, "t_end": t_end, "dt": 0.05}
+    found = dap.sensitivities(scene, ["bodies.ball.r_dot.x", "bodies.ball.mass"], **settings)
+    t1, by_v = x / v, -x / v**2
+    assert [event.kind for event in found.result.events] == ["touch", "lift"]
+    assert found.event_times[1] == pytest.approx([by_v, 0.0], rel=TOLERANCE)
+    assert found.final("ball.r.z") == pytest.approx([G * (t_end - t1) * by_v, 0.0], rel=TOLERANCE)
+
+
+@pytest.mark.slow
+def test_a_hinged_rod_that_lifts_off_by_radau():
+    """Its rates at the end of a step are a polynomial's: derivatives of the instant were so, too.
+
+    They were off by 5e-6 of themselves.
+    """
+    scene, name = scene_of(12_850_238), "bodies.b2.mass"
+    settings = {"t_end": 0.265, "dt": 0.265, "rtol": 1e-11, "atol": 1e-13}
+    found = [dap.sensitivities(scene, [name], integrator=integrator, contact="events", **settings)
+             for integrator in ("radau", "dop853")]  # fmt: skip
+    one, other = (s.event_times[-1] for s in found)
+    assert found[0].result.events[-1].kind == "lift"
+    assert one == pytest.approx(other, rel=TOLERANCE)
+
+
+@pytest.mark.slow
+def test_slip_from_rest_has_no_derivative():
+    """A block that begins to slide goes where the least slip does; by its mass there is one."""
+    scene = ball(mu=0.1, radius=0.1)
+    scene.add_force("f", "pull", body_i="ball", f=[20.0, 0.0, 0.0])
+    settings = TIGHT | {"t_end": 0.2, "dt": 0.1}
+    found = dap.sensitivities(scene, ["bodies.ball.mass"], **settings)
+    assert np.isfinite(found.final("ball.r.x")).all()
+    with pytest.raises(dap.SimulationError, match=r"r_dot\.y: contact floor begins to slide"):
+        dap.sensitivities(scene, ["bodies.ball.r_dot.y"], **settings)

@@ -274,7 +274,7 @@ def step(work: AdamsState, functions: Any, system: Any, loops: Any) -> None:
     t1 = min(end, work.step_limit)
     h = t1 - t
     if work.switch_count != 0:
-        h = min(h, next_length(work, end, work.differences[0], project, watch, system, loops))
+        h = min(h, next_length(work, end, work.differences[0], rhs, project, watch, system, loops))
         if h == 0.0:
             return
         t1 = t1 if h == t1 - t else t + h

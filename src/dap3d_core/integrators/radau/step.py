@@ -86,7 +86,7 @@ def advance(
             tangent.bends[0] = 0.0
             start(work, rhs, project, system, loops)
         else:
-            step(work, parts, tangents, (project, accepted, watch), given)
+            step(work, parts, tangents, (rhs, project, accepted, watch), given)
             h = work.factored_step
             if work.rounding_state != 0 and h > 0.0 and can_measure(work, rejected):
                 measure = parts[4]
@@ -125,15 +125,15 @@ def start(work: RadauState, rhs: Function, project: Function, system: System, lo
 def step(
     work: RadauState, parts: Sequence[Any], tangents: Sequence[Any], functions: Any, given: Given
 ) -> None:
-    """Try one step: accept it, reject it, or stop the run; functions: project, accepted, watch."""
+    """Try one step: accept, reject or stop; functions: rhs, project, accepted, watch."""
     system, loops, _tangent, _matrix = given
-    project, accepted, watch = functions
+    rhs, project, accepted, watch = functions
     estimate_error, find_slope, find_work = parts[2], parts[3], parts[5]
     state, adaptive, t = work.state, work.fixed_step == 0.0, work.t
     end = t1 = end_of_step(work)
     longest = h = t1 - t
     if work.switch_count != 0 or min(work.step_limit, t + work.step_limit_at_switch) < t1:
-        h = next_length(work, t1, state[SLOPE], project, watch, system, loops)
+        h = next_length(work, t1, state[SLOPE], rhs, project, watch, system, loops)
         if h == 0.0:
             return
         t1 = t1 if h == longest else t + h

@@ -76,7 +76,7 @@ def plan_step(
         else:
             limit = min(work.step_limit, work.t + work.step_limit_at_switch)
             if work.switch_count != 0 or limit < end:
-                h = min(h, next_length(work, end, work.k[0], project, watch, system, loops))
+                h = min(h, next_length(work, end, work.k[0], rhs, project, watch, system, loops))
             if h != 0.0:
                 lanes.length[k], lanes.goal[k] = h, end
                 lanes.end[k] = work.t + h if h < longest else end

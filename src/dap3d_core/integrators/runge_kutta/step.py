@@ -113,7 +113,7 @@ def step(work: RungeKuttaState, functions: Any, system: Any, loops: Any) -> None
     if adaptive:
         h = min(h, with_slopes(limit_step_at_singularity(work, longest), 0.0))
     if work.switch_count != 0 or min(work.step_limit, work.t + work.step_limit_at_switch) < t1:
-        h = min(h, next_length(work, t1, work.k[0], project, watch, system, loops))
+        h = min(h, next_length(work, t1, work.k[0], rhs, project, watch, system, loops))
         if h == 0.0:
             return
     if h < longest:

@@ -62,7 +62,8 @@ SAME = 1.0 / 32.0
 #: part of its drop: of a sine 5 % in a step of 1.5 rad, 20 % in one of 3.
 MAX_SUSPICIONS, PLACES, NEWTON_STEPS, CUBIC_ERROR = 8, 16, 3, 0.25
 #: Newton steps for derivatives of an instant; each leaves the error of the rate, 1e-4 as a rule.
-CROSSING_PASSES = 4
+#: Part of the change over such a difference that a switch may be from zero where it has crossed it.
+CROSSING_PASSES, JUMPED = 4, 0.01
 #: A switch that changes its sign more often than this while time advances by less than this part of
 #: the run chatters.
 CHATTER, CHATTER_SPAN = 100, 1e-6
@@ -70,12 +71,12 @@ CHATTER, CHATTER_SPAN = 100, 1e-6
 
 @compiled
 def next_length(
-    work: IntegrationState, end: float, slope: Floats, project: Function, watch: Function,
-    system: Any, loops: Any,
+    work: IntegrationState, end: float, slope: Floats, rhs: Function, project: Function,
+    watch: Function, system: Any, loops: Any,
 ) -> float:  # fmt: skip
     """Length of the next step, which may go to time ``end``; 0 where it has been done here.
 
-    slope: dy/dt at the state.
+    slope: dy/dt at the state, as the integrator has it.
     """
     longest, work.middle_part = min(end, work.step_limit) - work.t, 0.0
     h = min(longest, with_slopes(work.step_limit_at_switch, 0.0))
@@ -93,7 +94,7 @@ def next_length(
     if work.stalled_steps != 0 and work.fixed_step == 0.0:
         longest = work.step_limit - work.t  # a usual step may be as short as the stalled ones
     h = min(min(longest, 2.0 * short), work.times[work.next_report] - work.t)
-    bisect_crossing(work, h, end, slope, project, watch, system, loops)
+    bisect_crossing(work, h, end, slope, rhs, project, watch, system, loops)
     return 0.0
 
 
@@ -318,31 +319,35 @@ def update_switches_after_step(
 
 @compiled
 def bisect_crossing(
-    work: IntegrationState, h: float, end: float, slope: Floats, project: Function, watch: Function,
-    system: Any, loops: Any,
+    work: IntegrationState, h: float, end: float, slope: Floats, rhs: Function, project: Function,
+    watch: Function, system: Any, loops: Any,
 ) -> None:  # fmt: skip
     """Take an Euler step of length h, or to the crossing in it, where integration starts anew."""
-    s = work.switches
-    t = work.t
+    s, t, unknown, rates = work.switches, work.t, 0.0, slope
+    if is_differentiated():
+        rates = work.state[at.SCRATCH]  # that of a polynomial would be wrong by its error
+        rhs(t, work.state[at.Y], rates, system, loops)
     low, high, least = 0.0, h, 1e-3 * EPSILON * time_span(work)
-    failure = euler_step(work, high, slope, project, watch, system, loops)
+    failure = euler_step(work, high, slope, rates, project, watch, system, loops)
     crossed = work.switch_count != 0 and is_across(s, at.FOUND)
     if crossed:
         middle = 0.5 * high
         while failure == at.RUNNING and t + low < t + middle < t + high and high - low > least:
-            failure = euler_step(work, middle, slope, project, watch, system, loops)
+            failure = euler_step(work, middle, slope, rates, project, watch, system, loops)
             if is_across(s, at.FOUND):
                 high = middle
             else:
                 low = middle
             middle = 0.5 * (low + high)
         if failure == at.RUNNING:
-            high = differentiated_crossing(work, high, slope, project, watch, system, loops)
-            failure = euler_step(work, high, slope, project, watch, system, loops)
-        record_crossings(work, t + high)
+            high = differentiated_crossing(work, high, slope, rates, project, watch, system, loops)
+            if is_differentiated() and has_jumped(work):
+                unknown, high = with_slopes(0.0, high * np.nan), with_slopes(high, 0.0)
+            failure = euler_step(work, high, slope, rates, project, watch, system, loops)
+        record_crossings(work, t + high, unknown)
         if failure == at.RUNNING and work.end_status == at.SWITCHED:
             high = with_slopes(low, high)
-            failure = euler_step(work, high, slope, project, watch, system, loops)
+            failure = euler_step(work, high, slope, rates, project, watch, system, loops)
     if failure != at.RUNNING:
         work.t_stop, work.status = t + high, failure
         return
@@ -379,8 +384,8 @@ def bisect_crossing(
 
 @compiled
 def differentiated_crossing(
-    work: IntegrationState, h: float, slope: Floats, project: Function, watch: Function,
-    system: Any, loops: Any,
+    work: IntegrationState, h: float, slope: Floats, rates: Floats, project: Function,
+    watch: Function, system: Any, loops: Any,
 ) -> float:  # fmt: skip
     """The length h of an Euler step to a crossing, with the derivatives that keep the switch zero.
 
@@ -392,30 +397,49 @@ def differentiated_crossing(
     s, count = work.switches, work.projection_count
     beside = with_slopes(rate_difference(work), 0.0)
     for _ in range(CROSSING_PASSES):
-        euler_step(work, h + beside, slope, project, watch, system, loops)
+        euler_step(work, h + beside, slope, rates, project, watch, system, loops)
         copy(s[at.FOUND_RATE], s[at.FOUND])
-        euler_step(work, h - beside, slope, project, watch, system, loops)
+        euler_step(work, h - beside, slope, rates, project, watch, system, loops)
         for k in range(s.shape[1]):
             s[at.FOUND_RATE, k] = (s[at.FOUND_RATE, k] - s[at.FOUND, k]) / (2.0 * beside)
-        euler_step(work, h, slope, project, watch, system, loops)
-        first = 0
-        for k in range(s.shape[1]):
-            if first == 0 and s[at.FOUND, k] * s[at.SIDE, k] < 0.0 and s[at.FOUND_RATE, k] != 0.0:
-                h = with_slopes(h, h - s[at.FOUND, k] / s[at.FOUND_RATE, k])
-                first = 1
+        euler_step(work, h, slope, rates, project, watch, system, loops)
+        k = first_across(s)
+        if k >= 0 and s[at.FOUND_RATE, k] != 0.0:
+            h = with_slopes(h, h - s[at.FOUND, k] / s[at.FOUND_RATE, k])
     work.projection_count = count
     return h
 
 
 @compiled
+def first_across(s: Floats) -> int:
+    """The first switch that lies across; -1 where none does."""
+    for k in range(s.shape[1]):
+        if s[at.FOUND, k] * s[at.SIDE, k] < 0.0:
+            return k
+    return -1
+
+
+@compiled
+def has_jumped(work: IntegrationState) -> bool:
+    """True if the switch that was crossed last jumped there, by its rate beside: no zero of it is.
+
+    Its instant has derivatives of another kind then, which are NaN here (study/sensitivities).
+    """
+    s, k = work.switches, first_across(work.switches)
+    if k < 0:
+        return False
+    return abs(s[at.FOUND, k]) > JUMPED * abs(s[at.FOUND_RATE, k]) * rate_difference(work)
+
+
+@compiled
 def euler_step(
-    work: IntegrationState, h: float, slope: Floats, project: Function, watch: Function,
-    system: Any, loops: Any,
+    work: IntegrationState, h: float, slope: Floats, rates: Floats, project: Function,
+    watch: Function, system: Any, loops: Any,
 ) -> int:  # fmt: skip
     """The state after a very short time h, on its constraints, as trial state; its switches."""
     t, y, trial = work.t + h, work.state[at.Y], work.state[at.TRIAL]
     for i in range(y.shape[0]):
-        trial[i] = y[i] + h * slope[i]
+        trial[i] = with_slopes(y[i] + h * slope[i], y[i] + h * rates[i])
     failure = project_state(work, t, trial, project, system, loops)
     if failure == at.RUNNING and work.switch_count != 0:
         evaluate(work, t, trial, at.FOUND, watch, system, loops)
@@ -423,18 +447,21 @@ def euler_step(
 
 
 @compiled
-def record_crossings(work: IntegrationState, t: float) -> None:
-    """Record sign changes of switches at t, and what follows: end, chatter, or another side."""
+def record_crossings(work: IntegrationState, t: float, unknown: float) -> None:
+    """Record sign changes of switches at t, and what follows: end, chatter, or another side.
+
+    unknown: 0; its derivatives are NaN where those of the instant are to be found otherwise.
+    """
     s = work.switches
     for k in range(s.shape[1]):
         if not s[at.FOUND, k] * s[at.SIDE, k] < 0.0:
             continue
         s[at.SIDE, k] = -s[at.SIDE, k]
-        record_crossing(work, k, t)
+        record_crossing(work, k, t + unknown)
         if s[at.DOES, k] == ENDS and s[at.SIDE, k] < 0.0:
             work.end_status, work.terminal_switch = at.SWITCHED, k
         if s[at.DOES, k] >= JUMPS:
-            s[at.CROSSED, k] = s[at.SIDE, k]
+            s[at.CROSSED, k] = s[at.SIDE, k] + unknown
         if s[at.COUNT, k] == 0.0 or t - s[at.SINCE, k] > CHATTER_SPAN * (
             work.times[-1] - work.times[0]
         ):

@@ -23,6 +23,7 @@ from dap3d_core.formulations.contacts.decide import (
     decide,
     repeat,
 )
+from dap3d_core.formulations.contacts.forces import still_speed
 from dap3d_core.formulations.contacts.impacts import ROUNDS, TOUCHING
 from dap3d_core.formulations.contacts.modes import AT_FLOOR, NEARLY, nearly_jams
 from dap3d_core.formulations.contacts.rows import follow_joints, keep_velocities, meet, put_rows
@@ -49,6 +50,8 @@ MOST_JAMS, RATTLING = 500, 1e-2
 MOST_STEPS, SLOW = 10_000, 1e-5
 #: Slip, m/s, that may be stiff.
 STIFF_SLIP = 1e-4
+#: Slip among the numbers of a contact.
+PLANE = slice(SLIP, SLIP + 3)
 #: Records of changes from one mode to another.
 CHANGES = {(0, 1): "touch", (0, 2): "touch", (1, 0): "lift", (2, 0): "lift", (1, 2): "stick",
            (2, 1): "slip"}  # fmt: skip
@@ -134,6 +137,20 @@ class ContactJumps(Jumps):
             self._refuse_endless(integration, [table.names[c] for c in np.nonzero(ended)[0]])
         self._resolve(integration, TOUCHING * table.length, ended)
 
+    def slips(self, integration: Integration) -> Floats:
+        """As of ``Jumps``."""
+        slips: Floats = self.table.outputs(integration.t, self._place(integration))[:, PLANE]
+        return slips
+
+    def sliding_from_rest(self, integration: Integration) -> dict[str, int]:
+        """As of ``Jumps``."""
+        table, speeds = self.table, np.linalg.norm(self.slips(integration), axis=1)
+        slides = (self._evaluator.states[table.mode] == 1.0) & (self.arrays.mu > 0.0)
+        slides &= table.holds[:, 1:].all(axis=1)
+        places = [c for c in np.flatnonzero(slides).tolist()
+                  if speeds[c] <= still_speed(self.arrays, c)]  # fmt: skip
+        return {table.names[c]: c for c in places}
+
     def repeat_of(self, other: Jumps) -> None:
         """Decide what another decided at its last instant, at states nearby."""
         assert isinstance(other, ContactJumps)
@@ -159,7 +176,7 @@ class ContactJumps(Jumps):
             s, table, u = self.arrays, self.table, self._state_of(integration)
             modes = self._evaluator.states[table.mode]
             self._put_rows(integration)
-            slip = np.linalg.norm(table.outputs(t, u)[:, SLIP : SLIP + 3], axis=1)
+            slip = np.linalg.norm(table.outputs(t, u)[:, PLANE], axis=1)
             sliding = np.where(modes == 1.0, slip, np.inf)
             closed = np.flatnonzero(modes > 0.5).tolist()
             s.touching[: len(closed)], s.touching_count = closed, len(closed)

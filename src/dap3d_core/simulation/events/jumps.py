@@ -82,6 +82,14 @@ class Jumps:
     def repeat_of(self, other: "Jumps") -> None:
         """Decide what another decided at its last instant, at states nearby."""
 
+    def slips(self, integration: Integration) -> Floats:
+        """(m, 3) slip of each contact, m/s."""
+        return np.zeros((0, 3))
+
+    def sliding_from_rest(self, integration: Integration) -> dict[str, int]:
+        """Name -> place among ``slips`` of contacts that slide, in a plane, and are still."""
+        return {}
+
     def restart(self, integration: Integration) -> None:
         """Forget the jumps so far, and begin again."""
         self.records, self.count, self.lose = [], 0, False

@@ -1,19 +1,14 @@
 """Public function ``sensitivities``: a run and its derivatives by parameters of the scene."""
 
-import copy
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from dap3d_core.formulations.programs.change_over import ChangeOver
-from dap3d_core.integrators import Integration
-from dap3d_core.integrators.stepping.integration_state import Y
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import jit_is_on
-from dap3d_core.kernels.runtime.lanes import Differentiation
 from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.suggestions import some
 from dap3d_core.result import Result, ResultError, RunMetadata, find
@@ -26,14 +21,12 @@ from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks
 from dap3d_core.simulation.settings import compiled_for, settings_of
 from dap3d_core.simulation.simulate import given_state, start_word
-from dap3d_core.study.batch.compiled_batch import arrays_of_numbers
 from dap3d_core.study.differences import motion_of
 from dap3d_core.study.outputs import Output, Reduction
 from dap3d_core.study.parameters import SceneParameter, parameters_named
+from dap3d_core.study.sensitivities.differentiated_run import DifferentiatedRun
 from dap3d_core.study.sensitivities.neighbours import (
     Neighbours,
-    arrays_of,
-    floats_of,
     neighbours_of,
     run_beside,
     total_derivative,
@@ -252,7 +245,7 @@ def sensitivities(
             run = DifferentiatedRun(compiled, simulation, Callbacks(announce=announce), start=state)
             results.append(run.carry(beside, base, lanes).execute())
         runs.append(run)
-    for note in _notes(compiled, runs):
+    for note in _notes(compiled, runs, results[0]):
         results[0].note(note)
     return Sensitivities(results[0], runs, parameters)
 
@@ -287,20 +280,31 @@ def directions_of(count: int) -> tuple[int, int]:
     return directions, next(lanes for lanes in FAST if lanes >= directions)
 
 
-def _notes(compiled: CompiledModel, runs: "Sequence[DifferentiatedRun]") -> list[str]:
-    """Notes on laws, and where an uncorrected start leaves its constraints with a parameter."""
-    of_laws = notes_on_derivatives(compiled.checked)
+def _notes(
+    compiled: CompiledModel, runs: "Sequence[DifferentiatedRun]", result: Result
+) -> list[str]:
+    """Notes on laws, on slip that ended, and on uncorrected starts that leave their constraints."""
+    notes = notes_on_derivatives(compiled.checked)
+    contacts = {contact.name.partition("#")[0] for contact in compiled.checked.contacts}
+    stuck = {
+        e.name for e in result.events if e.kind == "stick" and e.name.partition("#")[0] in contacts
+    }
+    if stuck:
+        notes.append(
+            f"derivatives: slip of {some(sorted(stuck))} came to an end; where it had turned, "
+            "they are good to a few parts of a thousand behind that, with rtol = 1e-12 to more "
+            "than 1e-7, and by adams not even so"
+        )
     found = [
         beside.parameter.name for run in runs for beside in run.neighbours if beside.is_brought_back
     ]
-    if not found:
-        return of_laws
-    return [
-        *of_laws,
-        f"derivatives: the start leaves its constraints with {some(found)} and is not "
-        "corrected: they are those of a start that is brought onto the constraints (switch correct "
-        "on for runs that do so)",
-    ]
+    if found:
+        notes.append(
+            f"derivatives: the start leaves its constraints with {some(found)} and is not "
+            "corrected: they are those of a start that is brought onto the constraints (switch "
+            "correct on for runs that do so)"
+        )
+    return notes
 
 
 def parameters_by(checked: ValidatedScene, names: Sequence[str]) -> tuple[SceneParameter, ...]:
@@ -313,168 +317,3 @@ def parameters_by(checked: ValidatedScene, names: Sequence[str]) -> tuple[SceneP
         what = "name a parameter of the scene, such as bodies.crank.mass"
         raise SceneError([Mistake("by", MISSING, what)])
     return parameters_named(checked, names, "by")
-
-
-class DifferentiatedRun(Run):
-    """A run with its derivatives by some parameters.
-
-    Attributes:
-        neighbours: of each parameter.
-        base: the run at its start, for differences of what Python computes.
-        reported, slopes: (k, width) rows in coordinates of bodies, and (k, width, p) their
-            derivatives, in parts.
-        instants: time of each located event and jump -> (p,) its derivatives.
-    """
-
-    def carry(self, neighbours: Sequence[Neighbours], base: Run, lanes: int) -> Self:
-        """Carry derivatives from the start on; lanes: directions that code is compiled for."""
-        self.neighbours, self.base, self._lanes = list(neighbours), base, lanes
-        self.reported: list[Floats] = []
-        self.slopes: list[Floats] = []
-        self.instants: dict[float, Floats] = {}
-        return self
-
-    def begin(self, integration: Integration) -> None:
-        """As of ``RunState``: the integration is differentiated.
-
-        Raises:
-            SimulationError: it is the second one of the run.
-        """
-        if self.integrations:
-            raise SimulationError(
-                "derivatives end where an integrator hands over to another one; take one alone "
-                "(integrator radau, where the scene is stiff)"
-            )
-        super().begin(integration)
-        self._differentiation = Differentiation(1 + self._lanes)
-        integration.call = self._differentiation.call  # type: ignore[method-assign]
-        integration.rows = self._rows  # type: ignore[method-assign]
-        self._seed()
-        integration.compile()
-        if integration.takes_programs:
-            self.programs = self._programs()
-        if self.jumps is not None:
-            law = type(self.jumps)
-            self.jumps.begin = self._jumping(law.begin)  # type: ignore
-            self.jumps.apply = self._jumping(law.apply)  # type: ignore
-
-    def _slopes_of(self, array: Floats) -> Floats:
-        """(size, p) view of the derivatives of an array of the integration."""
-        return self._differentiation.slopes(array)[:, : len(self.neighbours)]
-
-    def _seed(self) -> None:
-        """Derivatives of all numbers at the start."""
-        for argument in self.present.loop_arguments:
-            self._differentiation.wide(argument)
-        arrays = floats_of(self)
-        ends = np.cumsum([array.size for array in arrays.values()])[:-1]
-        for j, beside in enumerate(self.neighbours):
-            if beside.copied is not None:
-                of_numbers, of_state = beside.copied
-                for array, slope in zip(arrays_of_numbers(self.evaluator), of_numbers, strict=True):
-                    self._slopes_of(array)[:, j] = slope
-                self._slopes_of(self.present.work.state[Y])[:, j] = of_state
-                continue
-            found = beside.derivative(
-                lambda run: _finite(np.concatenate([*floats_of(run).values()]))
-            )
-            for array, slope in zip(arrays.values(), np.split(found, ends), strict=True):
-                self._slopes_of(array)[:, j] = slope
-
-    def _programs(self) -> ChangeOver:
-        """Programs of the scene in differentiated form; numbers that have slopes are loaded."""
-        evaluator = copy.copy(self.evaluator)
-        evaluator.functions = self._differentiation.wide(evaluator.functions)
-        evaluator.loops = self._differentiation.wide(evaluator.loops)
-        varied = {
-            name: np.flatnonzero(self._slopes_of(array).any(axis=1))
-            for name, array in evaluator.system.walk()
-            if array.dtype.kind == "f" and array.size
-        }
-        return ChangeOver(evaluator, varied, self._differentiation.count)
-
-    def _rows(self) -> Floats:
-        """As ``Integration.rows``; their derivatives are kept."""
-        integration = self.present
-        work, count = integration.work, int(integration.work.row_count)
-        raw = work.rows[:count].copy()
-        slopes = self._slopes_of(work.rows)[: count * work.rows.shape[1]]
-        slopes = slopes.reshape(count, work.rows.shape[1], len(self.neighbours)).copy()
-        if count and not self.evaluator.coordinates.are_of_bodies:
-            motion = slice(1, work.state.shape[1])  # without the work done, which may be large
-            slopes = self._derivative(
-                lambda run, rows: run.evaluator.body_rows(rows), raw, slopes, motion
-            )
-        if count:
-            self.slopes.append(slopes)
-            self.reported.append(self.evaluator.body_rows(raw))
-        for row in work.crossings[: integration.crossing_count]:
-            place = int(np.flatnonzero(work.crossings[:, 0] == row[0])[0])
-            self.instants[float(row[0])] = self._slopes_of(work.crossings)[3 * place].copy()
-        return type(integration).rows(integration)
-
-    def _derivative(
-        self, function: Callable[[Run, Floats], Floats], x: Floats, slopes: Floats, motion: slice
-    ) -> Floats:
-        return total_derivative(function, self.neighbours, self.base, x, slopes, motion)
-
-    def _jumping(self, change: Callable[..., None]) -> Callable[[Integration], None]:
-        """A jump of velocities, whose derivatives are those of the law that Python solves."""
-        of = self.jumps
-        assert of is not None
-
-        def jump(integration: Integration) -> None:
-            work = integration.work
-            present = [(name, array.copy()) for name, array in arrays_of(self)]
-            of_time = self._slopes_of(work.real)[work.indices("real")["t"]].copy()
-            of_state = self._slopes_of(work.state)[: work.state.shape[1]].copy()
-            given = np.append(work.state[Y], work.t)
-            system = {
-                name: self._slopes_of(array).copy()
-                for name, array in arrays_of(self)
-                if array.dtype.kind == "f" and not name.startswith("0.") and array.size
-            }
-
-            def after(run: Run, state: Floats) -> Floats:
-                arrays = dict(arrays_of(run))
-                offset, j = self._offset_of(run)
-                for name, array in present:
-                    arrays[name][...] = array
-                    if offset and name in system:
-                        arrays[name] += offset * system[name][:, j].reshape(array.shape)
-                own = run.present.work
-                own.state[Y], own.t = state[:-1], state[-1]
-                jumps = type(of)(run.evaluator)
-                jumps.span = of.span
-                jumps.repeat_of(of)
-                try:
-                    change(jumps, run.present)
-                except SimulationError as error:  # shorter differences may not come to that
-                    failures.append(error)
-                    return np.full_like(own.state[Y], np.nan)
-                return own.state[Y].copy()
-
-            failures: list[SimulationError] = []
-            change(of, integration)
-            motion = slice(0, -2)  # without the work done and time
-            slopes = self._derivative(after, given, np.vstack([of_state, of_time]), motion)
-            if np.isnan(slopes).any():
-                what = f"there is no derivative of what happens at t = {work.t:.9g} s"
-                raise SimulationError(f"{what}: {failures[-1]}") from failures[-1]
-            self.instants[float(work.t)] = of_time
-            self._differentiation.take()
-            self._slopes_of(work.state)[: work.state.shape[1]] = slopes
-
-        return jump
-
-    def _offset_of(self, run: Run) -> tuple[float, int]:
-        """How far the parameter of a neighbour is from its value, and which one it is."""
-        for j, beside in enumerate(self.neighbours):
-            if offset := beside.offset_of(run):
-                return offset, j
-        return 0.0, 0
-
-
-def _finite(x: Floats) -> Floats:
-    """Numbers, with zero for those that are not finite: limits that are not set."""
-    return np.where(np.isfinite(x), x, 0.0)

@@ -1,0 +1,311 @@
+"""A run whose compiled code is differentiated, with jumps whose derivatives Python finds."""
+
+import copy
+from collections.abc import Callable, Sequence
+from typing import Self
+
+import numpy as np
+
+from dap3d_core.formulations.programs.change_over import ChangeOver
+from dap3d_core.integrators import Integration
+from dap3d_core.integrators.stepping.integration_state import CROSSED, Y
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.runtime.lanes import Differentiation
+from dap3d_core.simulation import SimulationError
+from dap3d_core.simulation.run import Run
+from dap3d_core.study.batch.compiled_batch import arrays_of_numbers
+from dap3d_core.study.sensitivities.neighbours import (
+    Neighbours,
+    arrays_of,
+    floats_of,
+    total_derivative,
+)
+
+#: Part of a run by which a state lies before the jump of a switch.
+BEFORE_JUMP = 1e-12
+#: Derivative of a slip, over the largest one of the state, that is rounding.
+NO_SLIP = 1e-9
+
+
+class DifferentiatedRun(Run):
+    """A run with its derivatives by some parameters.
+
+    Attributes:
+        neighbours: of each parameter.
+        base: the run at its start, for differences of what Python computes.
+        reported, slopes: (k, width) rows in coordinates of bodies, and (k, width, p) their
+            derivatives, in parts.
+        instants: time of each located event and jump -> (p,) its derivatives.
+    """
+
+    def carry(self, neighbours: Sequence[Neighbours], base: Run, lanes: int) -> Self:
+        """Carry derivatives from the start on; lanes: directions that code is compiled for."""
+        self.neighbours, self.base, self._lanes = list(neighbours), base, lanes
+        self.reported: list[Floats] = []
+        self.slopes: list[Floats] = []
+        self.instants: dict[float, Floats] = {}
+        return self
+
+    def begin(self, integration: Integration) -> None:
+        """As of ``RunState``: the integration is differentiated.
+
+        Raises:
+            SimulationError: it is the second one of the run.
+        """
+        if self.integrations:
+            raise SimulationError(
+                "derivatives end where an integrator hands over to another one; take one alone "
+                "(integrator radau, where the scene is stiff)"
+            )
+        super().begin(integration)
+        self._differentiation = Differentiation(1 + self._lanes)
+        integration.call = self._differentiation.call  # type: ignore[method-assign]
+        integration.rows = self._rows  # type: ignore[method-assign]
+        self._seed()
+        integration.compile()
+        if integration.takes_programs:
+            self.programs = self._programs()
+        if self.jumps is not None:
+            law = type(self.jumps)
+            self.jumps.begin = self._jumping(law.begin)  # type: ignore
+            self.jumps.apply = self._jumping(law.apply)  # type: ignore
+
+    def _slopes_of(self, array: Floats) -> Floats:
+        """(size, p) view of the derivatives of an array of the integration."""
+        return self._differentiation.slopes(array)[:, : len(self.neighbours)]
+
+    def _seed(self) -> None:
+        """Derivatives of all numbers at the start."""
+        for argument in self.present.loop_arguments:
+            self._differentiation.wide(argument)
+        arrays = floats_of(self)
+        ends = np.cumsum([array.size for array in arrays.values()])[:-1]
+        for j, beside in enumerate(self.neighbours):
+            if beside.copied is not None:
+                of_numbers, of_state = beside.copied
+                for array, slope in zip(arrays_of_numbers(self.evaluator), of_numbers, strict=True):
+                    self._slopes_of(array)[:, j] = slope
+                self._slopes_of(self.present.work.state[Y])[:, j] = of_state
+                continue
+            found = beside.derivative(
+                lambda run: _finite(np.concatenate([*floats_of(run).values()]))
+            )
+            for array, slope in zip(arrays.values(), np.split(found, ends), strict=True):
+                self._slopes_of(array)[:, j] = slope
+
+    def _programs(self) -> ChangeOver:
+        """Programs of the scene in differentiated form; numbers that have slopes are loaded."""
+        evaluator = copy.copy(self.evaluator)
+        evaluator.functions = self._differentiation.wide(evaluator.functions)
+        evaluator.loops = self._differentiation.wide(evaluator.loops)
+        varied = {
+            name: np.flatnonzero(self._slopes_of(array).any(axis=1))
+            for name, array in evaluator.system.walk()
+            if array.dtype.kind == "f" and array.size
+        }
+        return ChangeOver(evaluator, varied, self._differentiation.count)
+
+    def _rows(self) -> Floats:
+        """As ``Integration.rows``; their derivatives are kept."""
+        integration = self.present
+        work, count = integration.work, int(integration.work.row_count)
+        raw = work.rows[:count].copy()
+        slopes = self._slopes_of(work.rows)[: count * work.rows.shape[1]]
+        slopes = slopes.reshape(count, work.rows.shape[1], len(self.neighbours)).copy()
+        if count and not self.evaluator.coordinates.are_of_bodies:
+            motion = slice(1, work.state.shape[1])  # without the work done, which may be large
+            slopes = self._derivative(
+                lambda run, rows: run.evaluator.body_rows(rows), raw, slopes, motion
+            )
+        if count:
+            self.slopes.append(slopes)
+            self.reported.append(self.evaluator.body_rows(raw))
+        for row in work.crossings[: integration.crossing_count]:
+            place, t = int(np.flatnonzero(work.crossings[:, 0] == row[0])[0]), float(row[0])
+            slopes = self._slopes_of(work.crossings)[3 * place].copy()
+            if np.isnan(slopes).any():
+                name = self._name_of(int(row[1]))
+                what = f"there is no derivative of the instant t = {t:.9g} s"
+                raise SimulationError(f"{what}: the switch of {name} jumps there")
+            self.instants[t] = slopes
+        return type(integration).rows(integration)
+
+    def _derivative(
+        self, function: Callable[[Run, Floats], Floats], x: Floats, slopes: Floats, motion: slice
+    ) -> Floats:
+        return total_derivative(function, self.neighbours, self.base, x, slopes, motion)
+
+    def _jumping(self, change: Callable[..., None]) -> Callable[[Integration], None]:
+        """A jump of velocities, whose derivatives are those of the law that Python solves."""
+        of = self.jumps
+        assert of is not None
+
+        def jump(integration: Integration) -> None:
+            work, put = integration.work, self._putting()
+            given = np.append(work.state[Y], work.t)
+            of_time = self._slopes_of(work.real)[work.indices("real")["t"]].copy()
+            of_state = self._slopes_of(work.state)[: work.state.shape[1]].copy()
+            if (k := self._jumped_switch()) >= 0:
+                rates = self._rates_before(put, given)
+                late = self._slopes_of_jump(k, put, rates, given, np.vstack([of_state, of_time]))
+                of_state, of_time = of_state + np.outer(rates, late), of_time + late
+                put(self)
+
+            def after(run: Run, state: Floats) -> Floats:
+                put(run)
+                own = run.present.work
+                own.state[Y], own.t = state[:-1], state[-1]
+                jumps = type(of)(run.evaluator)
+                jumps.span = of.span
+                jumps.repeat_of(of)
+                try:
+                    change(jumps, run.present)
+                except SimulationError as error:  # shorter differences may not come to that
+                    failures.append(error)
+                    return np.full_like(own.state[Y], np.nan)
+                return own.state[Y].copy()
+
+            failures: list[SimulationError] = []
+            change(of, integration)
+            motion = slice(0, -2)  # without the work done and time
+            slopes = self._derivative(after, given, np.vstack([of_state, of_time]), motion)
+            if np.isnan(slopes).any():
+                what = f"there is no derivative of what happens at t = {work.t:.9g} s"
+                raise SimulationError(f"{what}: {failures[-1]}") from failures[-1]
+            if change is type(of).begin:
+                self._refuse_slip_from_rest(put, slopes)
+            self.instants[float(work.t)] = of_time
+            self._differentiation.take()
+            self._slopes_of(work.state)[: work.state.shape[1]] = slopes
+            self._slopes_of(work.real)[work.indices("real")["t"]] = of_time
+
+        return jump
+
+    def _putting(self) -> Callable[[Run], None]:
+        """What makes all numbers those of the present, in a run, with its parameter's change."""
+        present = [(name, array.copy()) for name, array in arrays_of(self)]
+        system = {
+            name: self._slopes_of(array).copy()
+            for name, array in arrays_of(self)
+            if array.dtype.kind == "f" and not name.startswith("0.") and array.size
+        }
+
+        def put(run: Run) -> None:
+            arrays = dict(arrays_of(run))
+            offset, j = self._offset_of(run)
+            for name, array in present:
+                arrays[name][...] = array
+                if offset and name in system:
+                    arrays[name] += offset * system[name][:, j].reshape(array.shape)
+
+        return put
+
+    def _jumped_switch(self) -> int:
+        """The switch that has jumped as it was crossed; -1 where none has."""
+        switches = self.present.work.switches
+        slopes = self._slopes_of(switches)[CROSSED * switches.shape[1] :][: switches.shape[1]]
+        found = np.flatnonzero(np.isnan(slopes).any(axis=1))
+        slopes[found] = 0.0
+        return int(found[0]) if len(found) else -1
+
+    def _refuse_slip_from_rest(self, put: Callable[[Run], None], slopes: Floats) -> None:
+        """Where a contact begins to slide from rest, the least slip decides in which direction.
+
+        Args:
+            put: as of ``_putting``, before velocities have jumped.
+            slopes: (size, p) derivatives of the state.
+
+        Raises:
+            SimulationError: a parameter gives it some.
+        """
+        of, y = self.jumps, self.present.work.state[Y].copy()
+        assert of is not None
+        sliding = of.sliding_from_rest(self.present)
+        if not sliding:
+            return
+
+        def slips(run: Run, state: Floats) -> Floats:
+            put(run)
+            run.present.work.state[Y] = state
+            return type(of)(run.evaluator).slips(run.present)[list(sliding.values())]
+
+        of_slips = np.abs(self._derivative(slips, y, slopes, slice(0, -1)))
+        largest = np.max(np.abs(slopes), axis=0, initial=0.0)
+        for name, moved in zip(sliding, of_slips, strict=True):
+            for neighbours, most, size in zip(
+                self.neighbours, np.max(moved, axis=0), largest, strict=True
+            ):
+                if most > NO_SLIP * size:
+                    raise SimulationError(
+                        f"there is no derivative by {neighbours.parameter.name}: contact {name} "
+                        "begins to slide from rest, and the least slip would decide in which "
+                        "direction; give it some at the start"
+                    )
+        put(self)
+        self.present.work.state[Y] = y
+
+    def _name_of(self, switch: int) -> str:
+        return self.evaluator.switches[switch].name(self.evaluator.model)
+
+    def _rates_before(self, put: Callable[[Run], None], given: Floats) -> Floats:
+        """dy/dt just before a switch has jumped; given: state and time."""
+        put(self)
+        evaluator, (y, t) = self.evaluator, (given[:-1], given[-1])
+        back = BEFORE_JUMP * self.present.work.times[-1]
+        return evaluator.slope(t - back, y - back * evaluator.slope(t, y))
+
+    def _slopes_of_jump(
+        self,
+        k: int,
+        put: Callable[[Run], None],
+        rates: Floats,
+        given: Floats,
+        slopes: Floats,
+    ) -> Floats:
+        """(p,) derivatives of the time by which a switch jumps later where parameters differ.
+
+        Args:
+            k: the switch.
+            put: makes all but the state that of the instant, in a run.
+            rates: dy/dt before it.
+            given: state and time there; slopes: (size, p) derivatives of both.
+
+        Raises:
+            SimulationError: states beside do not come to a jump.
+        """
+        side, end = self.present.work.switches[CROSSED, k], self.present.work.times[-1]
+
+        def delay(run: Run, state: Floats) -> Floats:
+            put(run)
+            y, t, of = state[:-1], state[-1], run.evaluator
+
+            def is_behind(dt: float) -> bool:
+                return bool(of.switch_values(t + dt, y + dt * rates)[k] * side > 0.0)
+
+            reach = BEFORE_JUMP * end
+            while is_behind(-reach) or not is_behind(reach):
+                reach *= 2.0
+                if reach > end:
+                    return np.array([np.nan])
+            low, high = -reach, reach
+            while low < (middle := 0.5 * (low + high)) < high:
+                low, high = (low, middle) if is_behind(middle) else (middle, high)
+            return np.array([high])
+
+        found = self._derivative(delay, given, slopes, slice(0, -2))[0]
+        if np.isnan(found).any():
+            what = f"there is no derivative of the instant t = {given[-1]:.9g} s"
+            raise SimulationError(f"{what}: the switch of {self._name_of(k)} jumps there")
+        return found
+
+    def _offset_of(self, run: Run) -> tuple[float, int]:
+        """How far the parameter of a neighbour is from its value, and which one it is."""
+        for j, beside in enumerate(self.neighbours):
+            if offset := beside.offset_of(run):
+                return offset, j
+        return 0.0, 0
+
+
+def _finite(x: Floats) -> Floats:
+    """Numbers, with zero for those that are not finite: limits that are not set."""
+    return np.where(np.isfinite(x), x, 0.0)
