@@ -358,16 +358,28 @@ def bisect_crossing(
         work.segment_step += 1
     work.first_stage_valid = work.switch_rates_valid = work.cut_attempts = 0
     work.step_limit_at_switch = np.inf
-    stays = 0
+    crossed = leaves_zero(work, crossed)
+    if crossed:
+        reset_step_control(work)
+        for k in range(s.shape[1]):
+            if s[at.CROSSED, k] != 0.0 and work.end_status == 0:
+                work.status = at.JUMPED
+
+
+@compiled
+def leaves_zero(work: IntegrationState, crossed: bool) -> bool:
+    """Count steps at the end of which a switch stays where it is; True if one is across.
+
+    It is also where one has been zero for long and jumps decide what follows.
+    """
+    s, stays = work.switches, 0
     for k in range(s.shape[1]):
         if s[at.FOUND, k] == s[at.VALUE, k] and s[at.SIDE, k] * s[at.RATE, k] < 0.0:
             stays = 1  # a step to a crossing that changes no digit of its switch
         if s[at.VALUE, k] == 0.0 and s[at.FOUND, k] == 0.0 and s[at.SIDE, k] != 0.0:
             stays = 1
             if work.stalled_steps >= MAX_STALLS_AT_ZERO and s[at.DOES, k] >= JUMPS:
-                s[at.SIDE, k] = s[at.CROSSED, k] = -s[
-                    at.SIDE, k
-                ]  # what follows at zero, jumps decide
+                s[at.SIDE, k] = s[at.CROSSED, k] = -s[at.SIDE, k]
                 crossed = True
             elif work.stalled_steps >= MAX_STALLS_AT_ZERO:
                 s[at.SIDE, k] = 0.0  # it stays zero: it has no side until it leaves
@@ -375,11 +387,7 @@ def bisect_crossing(
         work.stalled_steps = 0
     elif work.stalled_steps != 0 or stays != 0:
         work.stalled_steps += 1
-    if crossed:
-        reset_step_control(work)
-        for k in range(s.shape[1]):
-            if s[at.CROSSED, k] != 0.0 and work.end_status == 0:
-                work.status = at.JUMPED
+    return crossed
 
 
 @compiled
