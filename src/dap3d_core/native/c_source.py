@@ -317,6 +317,10 @@ def _completion(prepared: PreparedRun) -> list[str]:
     if one.completes is None:
         return ["#define COMPLETES 0"]
     symbol, place, (work, arrays) = symbol_of(one.completes), prepared.image.at, one.arguments[:2]
+    states = prepared.evaluator.system.states
+    takes = ""
+    if states.size:  # modes are of the step as well, and contacts say the rest by them
+        takes = f"memcpy(w + {place(states)}, row + {arrays.first_state}, {states.nbytes});"
     return [
         "#define COMPLETES 1",
         f"#define PUSHED {place(work.pushed)}",
@@ -324,7 +328,7 @@ def _completion(prepared: PreparedRun) -> list[str]:
         f"#define START_ALONE {START_ALONE}",
         f"void {symbol}(void *, void *, double *, int64_t);",
         "static void complete(int64_t *w, double *row)",
-        f"{{ {symbol}(w + {place(work)}, w + {place(arrays)}, row, ROW); }}",
+        f"{{ {symbol}(w + {place(work)}, w + {place(arrays)}, row, ROW); {takes} }}",
     ]
 
 
