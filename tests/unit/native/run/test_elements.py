@@ -76,6 +76,19 @@ def test_contacts_are_those_of_a_result(tmp_path, make, settings):
     np.testing.assert_allclose(found, expected, rtol=0, atol=4e-15 * size)
 
 
+def test_a_state_of_an_element_has_the_bits_of_a_result(tmp_path):
+    scene = dap.Scene(name="damped")
+    scene.add_body("ball", mass=1.0, Jp=[0.01] * 3, r=[0, 0, -1.0])
+    ends = {"P_i": "ball.O", "P_j": "ground.O"}
+    scene.add_force("maxwell", "damper", **ends, k=100.0, c=10.0, l0=0.9)
+    scene.add_force("weight", "g")
+    _, library = exported(scene, tmp_path, outputs=["damper.z"])
+    run = library.start(1.0)
+    run.step_to(1.0)
+    expected = dap.simulate(scene, t_end=1.0).quantity("damper.z").values[-1]
+    assert run["damper.z"] == expected > 0.1
+
+
 def test_a_contact_has_derivatives_of_what_the_state_gives(tmp_path):
     """The gap of a ball above a plane is its height, and slip at its foot that of its centre."""
     outputs = ["floor.gap", "floor.slip.x", "floor.mode"]
