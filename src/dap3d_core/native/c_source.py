@@ -245,8 +245,8 @@ def _variables(variables: Sequence[Variable]) -> list[str]:
     )
     at = {v.name: k for k, v in enumerate(variables)}
     orders = [
-        f"{{{k}, {at[v.limits.under]}, {int(v.limits.is_open)}}}"
-        for k, v in enumerate(variables) if v.limits.under
+        f"{{{k}, {at[name]}, {int(is_open)}}}"
+        for k, v in enumerate(variables) for name, is_open in v.limits.under
     ]  # fmt: skip
     lines = ["static const char texts[] =", *texts_of, ";", *_table(head, rows)]
     lines.append(f"#define ORDERS {len(orders)}")
