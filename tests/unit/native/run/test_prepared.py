@@ -74,8 +74,10 @@ def test_what_nothing_carries_is_refused_by_name(tmp_path):
 
 
 def test_a_method_in_coordinates_of_joints_is_refused(tmp_path):
-    with pytest.raises(dap.SceneError, match="method standard or lsq"):
-        exported(swinging(), tmp_path, method="joint")
+    for make, what in ((swinging, "velocities jump"), (door, "contacts change at events")):
+        with pytest.raises(dap.SceneError, match=what) as refused:
+            exported(make(), tmp_path, method="joint")
+        assert 'set method = "lsq" in [simulation]' in str(refused.value)
 
 
 @pytest.mark.slow
