@@ -207,6 +207,22 @@ def test_friction_and_restitution_are_parameters(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("name", "there", "value"), [("e", 0.0, 0.5), ("mu_s", 0.3, 0.4)])
+def test_a_parameter_may_be_at_its_limit_in_the_scene(tmp_path, name, there, value):
+    """Values on one side of it are not accepted, with restitution 0 and mu_s as great as mu."""
+    scene, path = thrown(), f"contacts.floor.{name}"
+    scene.contacts["floor"].fields[name] = there
+    made, library = exported(scene, tmp_path, outputs=["ball.r", "ball.rd"], parameters=[path])
+    run = library.start(1.0)
+    run[path] = value
+    run.step_to(1.0)
+    scene.contacts["floor"].fields[name] = value
+    result = dap.simulate(scene, t_end=1.0, dt=1.0)
+    expected = np.hstack([result.r[-1, 0], result.rd[-1, 0]])
+    assert np.array_equal(run.values(made.outputs), expected)
+
+
+@pytest.mark.slow
 def test_what_contacts_cannot_do_ends_the_run_with_their_name(tmp_path):
     scene = door()
     scene.bodies["door"].w, scene.bodies["door"].r_dot = (0, -1.0, 0), (0, 0, 0.5)
