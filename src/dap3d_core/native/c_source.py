@@ -453,6 +453,7 @@ def _directions(
         more = [call.q, *call.group, call.first, *call.more]
         all_words = [*(f"x + {2 * place(part)}" for part in parts), *map(str, more)]
         lines.append(f"    void {symbol_of(one)}({four}, {', '.join(['int64_t'] * 6)});")
+        lines.append("    x[2 * COUNTER] = x[2 * COUNTER + 1] = 0.0;")
         lines.append(f"    {symbol_of(one)}({', '.join(all_words)});")
     return [*lines, "}", f"void {directions.symbol}({', '.join(['double *'] * 5)});"]
 

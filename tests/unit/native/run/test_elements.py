@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 from tests.unit.native.run.test_prepared import door, sled
-from tests.unit.native.test_export import RESISTING, SPRING, _written, declared_ball, exported
+from tests.unit.native.test_export import (
+    RESISTING,
+    SPRING,
+    _written,
+    declared_ball,
+    exported,
+    two_floors,
+)
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError, UnknownNameError
@@ -89,14 +96,16 @@ def test_a_state_of_an_element_has_the_bits_of_a_result(tmp_path):
     assert run["damper.z"] == expected > 0.1
 
 
-def test_a_contact_has_derivatives_of_what_the_state_gives(tmp_path):
+def test_contacts_have_derivatives_of_what_the_state_gives(tmp_path):
     """The gap of a ball above a plane is its height, and slip at its foot that of its centre."""
-    outputs = ["floor.gap", "floor.slip.x", "floor.mode"]
-    _, library = exported(declared_ball(), tmp_path, outputs=outputs)
+    outputs = ["floor_a.gap", "floor_b.gap", "floor_b.slip.x", "floor_b.mode"]
+    _, library = exported(two_floors(), tmp_path, outputs=outputs)
     run = library.start(1.0)
     run.step_to(0.05)
-    along = {"state.ball.r.z": 2.0, "state.ball.rd.x": 3.0}
-    assert run.directional(outputs, along).tolist() == pytest.approx([2.0, 3.0, 0.0], abs=1e-15)
+    along = {"state.b.r.z": 2.0, "state.b.rd.x": 3.0}
+    assert run.directional(outputs, along).tolist() == pytest.approx(
+        [0.0, 2.0, 3.0, 0.0], abs=1e-15
+    )
 
 
 def test_outputs_of_the_scene_may_be_reactions(tmp_path):
