@@ -125,7 +125,7 @@ def outputs_of(prepared: PreparedRun, names: Sequence[str] | None) -> Outputs:
                 continue
             raise refusal(
                 f"output {name}: {error} is computed by Python alone",
-                "name motions of bodies, points, joints, contacts, energies, or expressions of these",
+                "name motions, quantities of joints, forces and contacts, energies, or expressions",
             ) from None
         parts = list(value) if isinstance(value, tuple) else [value]
         for word, part in zip(_names_of(name, quantity.components), parts, strict=True):
