@@ -317,10 +317,9 @@ def _completion(prepared: PreparedRun) -> list[str]:
     if one.completes is None:
         return ["#define COMPLETES 0"]
     symbol, place, (work, arrays) = symbol_of(one.completes), prepared.image.at, one.arguments[:2]
-    states = prepared.evaluator.system.states
-    takes = ""
-    if states.size:  # modes are of the step as well, and contacts say the rest by them
-        takes = f"memcpy(w + {place(states)}, row + {arrays.first_state}, {states.nbytes});"
+    s, first = prepared.evaluator.system.states, arrays.first_state
+    # modes are of the step as well, and contacts say the rest by them
+    takes = f"memcpy(w + {place(s)}, row + {first}, {s.nbytes});" if s.size else ""
     return [
         "#define COMPLETES 1",
         f"#define PUSHED {place(work.pushed)}",
@@ -453,8 +452,7 @@ def _directions(
         more = [call.q, *call.group, call.first, *call.more]
         all_words = [*(f"x + {2 * place(part)}" for part in parts), *map(str, more)]
         lines.append(f"    void {symbol_of(one)}({four}, {', '.join(['int64_t'] * 6)});")
-        lines.append("    x[2 * COUNTER] = x[2 * COUNTER + 1] = 0.0;")
-        lines.append(f"    {symbol_of(one)}({', '.join(all_words)});")
+        lines += ["    x[2 * COUNTER] = 0.0;", f"    {symbol_of(one)}({', '.join(all_words)});"]
     return [*lines, "}", f"void {directions.symbol}({', '.join(['double *'] * 5)});"]
 
 

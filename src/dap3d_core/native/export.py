@@ -356,8 +356,7 @@ def export_model(
         PluginError: there is no such exporter, or it is broken.
         OSError: the file cannot be written, or exists and ``force`` is off.
     """
-    suffix = Path("" if path is None else path).suffix
-    kind = format or ("c" if suffix in FILES_OF_C else suffix.lstrip(".")) or "c"
+    kind = format or _format_of(path)
     chosen: dict[str, Any] = {
         "outputs": outputs, "parameters": parameters, "platforms": platforms, "t_end": t_end,
         "method": method, "integrator": integrator, "rtol": rtol, "atol": atol, "step": step,
@@ -372,6 +371,12 @@ def export_model(
     given |= {"strict": strict, "force": force, "allow_code": allow_code, "registry": registry}
     with background.optimiser.held():
         return export_native(scene, path, format=kind, fmi=fmi, **given)
+
+
+def _format_of(path: str | os.PathLike[str] | None) -> str:
+    """The format that the suffix of a path says."""
+    suffix = Path("" if path is None else path).suffix
+    return "c" if suffix in ("", *FILES_OF_C) else suffix.lstrip(".")
 
 
 def _require_format(kind: str, given: Iterable[str]) -> None:
