@@ -43,10 +43,11 @@ def test_an_fmu_is_chosen_by_its_suffix(tmp_path, capfd, fmi):
 
 
 @pytest.mark.parametrize("suffix", [".c", ".h"])
-def test_a_file_of_c_is_answered_by_the_folder_to_give(tmp_path, capfd, suffix):
+def test_a_file_of_c_is_answered_by_the_folder_to_give(tmp_path, monkeypatch, capfd, suffix):
+    monkeypatch.chdir(tmp_path)
     for more in ([], ["--format", "c"]):
-        assert main(["export", "pen1", "-o", str(tmp_path / f"made{suffix}"), *more]) == 2
+        assert main(["export", "pen1", "-o", f"made{suffix}", *more]) == 2
         said = capfd.readouterr().err
         assert "format c is a folder" in said
-        assert f"give {tmp_path / 'made'}\n" in said
+        assert "give made\n" in said
     assert not [*tmp_path.iterdir()]
