@@ -245,8 +245,8 @@ def _variables(variables: Sequence[Variable]) -> list[str]:
     )
     at = {v.name: k for k, v in enumerate(variables)}
     orders = [
-        f"{{{k}, {at[v.limits.under]}, {int(v.limits.is_open)}}}"
-        for k, v in enumerate(variables) if v.limits.under
+        f"{{{k}, {at[name]}, {int(is_open)}}}"
+        for k, v in enumerate(variables) for name, is_open in v.limits.under
     ]  # fmt: skip
     lines = ["static const char texts[] =", *texts_of, ";", *_table(head, rows)]
     lines.append(f"#define ORDERS {len(orders)}")
@@ -317,6 +317,9 @@ def _completion(prepared: PreparedRun) -> list[str]:
     if one.completes is None:
         return ["#define COMPLETES 0"]
     symbol, place, (work, arrays) = symbol_of(one.completes), prepared.image.at, one.arguments[:2]
+    s, first = prepared.evaluator.system.states, arrays.first_state
+    # modes are of the step as well, and contacts say the rest by them
+    takes = f"memcpy(w + {place(s)}, row + {first}, {s.nbytes});" if s.size else ""
     return [
         "#define COMPLETES 1",
         f"#define PUSHED {place(work.pushed)}",
@@ -324,7 +327,7 @@ def _completion(prepared: PreparedRun) -> list[str]:
         f"#define START_ALONE {START_ALONE}",
         f"void {symbol}(void *, void *, double *, int64_t);",
         "static void complete(int64_t *w, double *row)",
-        f"{{ {symbol}(w + {place(work)}, w + {place(arrays)}, row, ROW); }}",
+        f"{{ {symbol}(w + {place(work)}, w + {place(arrays)}, row, ROW); {takes} }}",
     ]
 
 
@@ -449,7 +452,7 @@ def _directions(
         more = [call.q, *call.group, call.first, *call.more]
         all_words = [*(f"x + {2 * place(part)}" for part in parts), *map(str, more)]
         lines.append(f"    void {symbol_of(one)}({four}, {', '.join(['int64_t'] * 6)});")
-        lines.append(f"    {symbol_of(one)}({', '.join(all_words)});")
+        lines += ["    x[2 * COUNTER] = 0.0;", f"    {symbol_of(one)}({', '.join(all_words)});"]
     return [*lines, "}", f"void {directions.symbol}({', '.join(['double *'] * 5)});"]
 
 

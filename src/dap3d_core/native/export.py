@@ -34,6 +34,8 @@ from dap3d_core.study.parameters import SceneParameter, parameters_named
 
 #: Formats, with the suffix of their files; "c" is a folder.
 NATIVE_FORMATS = {"c": "", "fmu": ".fmu"}
+#: Suffixes of files that it is not.
+FILES_OF_C = (".c", ".h")
 #: Letters of the name of a library at most.
 LONGEST = 100
 SOURCE = Path(__file__).parent / "source"
@@ -87,6 +89,9 @@ def export_native(
         OSError: a file cannot be written, or exists and ``force`` is off.
     """
     target = Path(path)
+    if format == "c" and target.suffix in FILES_OF_C:
+        folder = target.with_suffix("")
+        raise refusal(f"format c is a folder of files, not {target}", f"give {folder}")
     if fmi not in (2, 3):
         raise refusal(f"there is no FMI {fmi}", "FMI 3 and 2 are written")
     if target.exists() and not force:
@@ -336,7 +341,7 @@ def export_model(
         path: the file, of "c" a folder; None writes none, of formats of text. Files of meshes are
             named from its folder, or that of the scene.
         format: "fmu", "c" (header, libraries, an example) or the keyword of an exporter, such as
-            "urdf"; by default that of the path's suffix.
+            "urdf"; by default that of the path's suffix, "c" without one.
         outputs: of "fmu" and "c": names of quantities; by default the outputs of the scene, or
             where it has none the motion of its bodies.
         parameters: numbers that may be set, such as "forces.spring.k".
@@ -351,7 +356,7 @@ def export_model(
         PluginError: there is no such exporter, or it is broken.
         OSError: the file cannot be written, or exists and ``force`` is off.
     """
-    kind = format or Path("" if path is None else path).suffix.lstrip(".") or "c"
+    kind = format or _format_of(path)
     chosen: dict[str, Any] = {
         "outputs": outputs, "parameters": parameters, "platforms": platforms, "t_end": t_end,
         "method": method, "integrator": integrator, "rtol": rtol, "atol": atol, "step": step,
@@ -366,6 +371,12 @@ def export_model(
     given |= {"strict": strict, "force": force, "allow_code": allow_code, "registry": registry}
     with background.optimiser.held():
         return export_native(scene, path, format=kind, fmi=fmi, **given)
+
+
+def _format_of(path: str | os.PathLike[str] | None) -> str:
+    """The format that the suffix of a path says."""
+    suffix = Path("" if path is None else path).suffix
+    return "c" if suffix in ("", *FILES_OF_C) else suffix.lstrip(".")
 
 
 def _require_format(kind: str, given: Iterable[str]) -> None:

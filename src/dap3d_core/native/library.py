@@ -19,6 +19,7 @@ from dap3d_core.native.run.directions import Directions
 from dap3d_core.native.run.outputs import SYMBOL, Outputs
 from dap3d_core.native.run.prepared import PreparedRun
 from dap3d_core.registry.arguments import checked
+from dap3d_core.registry.suggestions import did_you_mean
 from dap3d_core.simulation import SimulationError
 
 OK, ENDED = 0, 1
@@ -95,7 +96,8 @@ class NativeRun:
 
     def _reference(self, name: str) -> int:
         if name not in self._library.references:
-            raise KeyError(f"the model has no variable {name!r}")
+            hint = did_you_mean(name, self._library.references, "; {}")
+            raise KeyError(f"the model has no variable {name!r}{hint}")
         return self._library.references[name]
 
     def __getitem__(self, name: str) -> float:

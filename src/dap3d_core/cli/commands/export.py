@@ -37,7 +37,8 @@ NATIVE_OPTIONS = {
     options.RESULT,
     click.option("-f", "--format", "kind", metavar="NAME",
                  help="vtk, gltf, mat or csv of a result; urdf, mjcf, c, fmu or that of a plugin "
-                 "of a MODEL; by default what the suffix of the file says, or vtk."),
+                 "of a MODEL; by default what the suffix of the file says; without one, c of a "
+                 "MODEL, vtk of a result."),
     options.output("A file; RESULT, or the name of MODEL, and the suffix by default."),
     options.FPS, options.MODEL_OF_RESULT, options.ALLOW_CODE,
     click.option("--strict", is_flag=True,
@@ -77,7 +78,8 @@ def export(
     """
     from dap3d_core.exchange import result_exporters
 
-    if kind in ("c", "fmu") or (kind is None and str(output or "").endswith(".fmu")):
+    kind = kind or _native_format(result, output)
+    if kind in ("c", "fmu"):
         return _export_native(result, kind, output, strict=strict, force=force,
                               allow_code=allow_code, **of_native)  # fmt: skip
     words = {"quantities": "--quantity", "parameters": "--parameter", "platforms": "--platform"}
@@ -92,6 +94,13 @@ def export(
     return _export_result(
         result, kind, output, fps=fps, model=model, allow_code=allow_code, force=force
     )
+
+
+def _native_format(source: str, output: str | None) -> str | None:
+    """The format of a .fmu, or of the folder of a library that a model is to be; else None."""
+    suffix = Path(output or "").suffix
+    is_model = output is not None and Path(source).suffix in ("", ".toml")
+    return "fmu" if suffix == ".fmu" else "c" if is_model and suffix in ("", ".c", ".h") else None
 
 
 def _model_format(output: str | None) -> str | None:
@@ -183,7 +192,7 @@ def _name_of(model: str) -> str:
 
 def _export_native(
     model: str,
-    kind: str | None,
+    kind: str,
     output: str | None,
     *,
     quantities: Sequence[str],
@@ -200,7 +209,6 @@ def _export_native(
     from dap3d_core.cli.framework.paths import writable
     from dap3d_core.result.file.atomic_write import cannot
 
-    kind = kind or "fmu"
     target = Path(output or _name_of(model) + (".fmu" if kind == "fmu" else ""))
     scene = dap.load(model)
     if kind == "fmu" or not target.exists():

@@ -52,7 +52,7 @@ class Element:
 
     Attributes:
         group, index: the element.
-        first: of the blocks of a joint, or of the forces on all bodies.
+        first: of the blocks of a joint, of the forces on all bodies, or of what a contact says.
         energy, tension: of a force.
         reads_loads: it is a force that reads multipliers.
     """
@@ -97,6 +97,12 @@ class Elements:
         """A force element."""
         return self._found("force", name)
 
+    def contact(self, name: str) -> Element:
+        """A point of a contact."""
+        found = self._found("contact", name)
+        assert found is not None  # every one says something
+        return found
+
     def finish(self) -> list[Any]:
         """Arrays and tables that the calls need."""
         self.arrays = ElementArrays(values=np.zeros(self._size))
@@ -106,7 +112,8 @@ class Elements:
     def _found(self, kind: str, name: str) -> Element | None:
         key = kind, name
         if key not in self._known:
-            self._known[key] = self._joint(name) if kind == "joint" else self._force(name)
+            finds = {"joint": self._joint, "force": self._force, "contact": self._contact}
+            self._known[key] = finds[kind](name)
         return self._known[key]
 
     def _take(self, size: int) -> int:
@@ -140,6 +147,20 @@ class Elements:
             self.calls.append(call)
             return Element(group, index, first)
         return None
+
+    def _contact(self, name: str) -> Element:
+        evaluator, s = self._evaluator, self._evaluator.system
+        contact = evaluator.model.joint_names.index(name)
+        q, group = next(
+            (q, group) for q, (kind, group) in enumerate(evaluator.loop_groups)
+            if kind == "switch" and group in evaluator.model.contacts and contact in group.members
+        )  # fmt: skip
+        index = int(np.flatnonzero(group.members == contact)[0])
+        size = len(group.type_info.outputs["tension"])
+        first, place = self._take(size), self._place(q, group, index)
+        table = loop_list([compiled_loop(group.type_info, "tension")])
+        self.calls.append(Call(table, 0, s, place, first, size, (self.counter, self.minus)))
+        return Element(group, index, first)
 
     def _force(self, name: str) -> Element:
         evaluator, s = self._evaluator, self._evaluator.system

@@ -6,6 +6,7 @@ outcome: a least and a greatest value.
 
 from collections.abc import Callable, Sequence
 from itertools import combinations, product
+from typing import Any
 
 import attrs
 import numpy as np
@@ -22,6 +23,8 @@ from dap3d_core.study.parameters import SceneParameter, all_parameters, with_val
 
 #: Tables whose numbers belong together: contacts have those of their materials.
 MATERIALS = {"materials", "contacts"}
+#: Part of the largest number by which one less is that as well.
+ROUNDED = 1e-12
 
 
 @attrs.frozen
@@ -30,14 +33,12 @@ class Limits:
 
     Attributes:
         low, high: those, whatever other parameters of the export are.
-        under: another of them, which it has to be at most, or less than; "" for none.
-        is_open: it has to be less.
+        under: others of them, which it has to be at most; or less than, where True is beside.
     """
 
     low: float = -LARGEST
     high: float = LARGEST
-    under: str = ""
-    is_open: bool = False
+    under: tuple[tuple[str, bool], ...] = ()
 
     @property
     def ends(self) -> list[tuple[float, float | None, str]]:
@@ -55,12 +56,10 @@ class Limits:
     def words(self) -> list[str]:
         """All that is said of values beyond them."""
         found = [said for *_, said in self.ends if said]
-        return found + ([f"should be {self.under_words} {self.under}"] if self.under else [])
-
-    @property
-    def under_words(self) -> str:
-        """How it compares to the parameter that it is under."""
-        return "less than" if self.is_open else "at most"
+        return found + [
+            f"should be {'less than' if is_open else 'at most'} {name}"
+            for name, is_open in self.under
+        ]
 
 
 #: Those of a number of which nothing is asked.
@@ -78,6 +77,7 @@ class _Trials:
         self._numbers: dict[tuple[str, ...], list[float]] = {}
         for one in all_parameters(checked):
             self._numbers.setdefault(one.path[:2], []).append(float(one.value or 0.0))
+        self._known: dict[tuple[Any, ...], float] = {}
 
     @IGNORE_FLOAT_ERRORS
     def accept(self, values: Sequence[tuple[SceneParameter, float]]) -> bool:
@@ -92,8 +92,13 @@ class _Trials:
 
     def last(self, one: SceneParameter, end: float, *others: tuple[SceneParameter, float]) -> float:
         """The last value that is accepted on the way to an end, with values of others."""
-        likely = [x for x in self._numbers.get(one.path[:2], ()) if x * end > 0.0]
-        return _limit(lambda x: self.accept([(one, x), *others]), one.value or 0.0, end, likely)
+        key = one.name, end, *((other.name, x) for other, x in others)
+        if key not in self._known:
+            likely = [x for x in self._numbers.get(one.path[:2], ()) if x * end > 0.0]
+            self._known[key] = _limit(
+                lambda x: self.accept([(one, x), *others]), one.value or 0.0, end, likely
+            )
+        return self._known[key]
 
 
 def limits_of(
@@ -111,7 +116,7 @@ def limits_of(
         Limits(trials.last(one, -LARGEST), trials.last(one, LARGEST))
         for one in parameters
     ]  # fmt: skip
-    in_order: set[int] = set()
+    orders: dict[tuple[int, int], bool] = {}
     for (a, one), (b, other) in combinations(enumerate(parameters), 2):
         if not _are_near(one, other) or OPEN in (limits[a], limits[b]):
             continue
@@ -119,15 +124,46 @@ def limits_of(
         if all(trials.accept([(one, x), (other, y)]) for x, y in product(*ends)):
             continue
         for k, n in ((a, b), (b, a)):
-            found = _ordered(trials, (parameters[k], parameters[n]), (limits[k], limits[n]))
-            if found and not in_order & {a, b}:
-                limits[k], limits[n] = found
-                in_order |= {a, b}
+            found = _order(trials, (parameters[k], parameters[n]), (limits[k], limits[n]))
+            if found is not None:
+                orders[k, n] = found
                 break
         else:
             what = f"what {one.name} may be depends on {other.name}"
             raise refusal(what, "leave one of these parameters out")
-    return limits
+    return _ordered(trials, parameters, limits, orders)
+
+
+def _ordered(
+    trials: _Trials, parameters: Sequence[SceneParameter], limits: Sequence[Limits],
+    orders: dict[tuple[int, int], bool],
+) -> list[Limits]:  # fmt: skip
+    """Limits of parameters whatever those are that they have to be under, or over.
+
+    orders: (lower, upper) -> it has to be less.
+    """
+
+    def beyond(k: int, *, up: bool) -> list[int]:
+        pairs = orders if up else [(b, a) for a, b in orders]
+        found = [n for m, n in pairs if m == k]
+        return list(dict.fromkeys([*found, *(x for n in found for x in beyond(n, up=up))]))
+
+    def end(k: int, *, up: bool) -> float:
+        others = [(parameters[n], end(n, up=up)) for n in beyond(k, up=up)]
+        if not others:
+            return limits[k].high if up else limits[k].low
+        return trials.last(parameters[k], LARGEST if up else -LARGEST, *others)
+
+    def limit(k: int, *, up: bool) -> float:
+        x = end(k, up=up)  # a little less where it is less than another
+        return float(np.copysign(LARGEST, x)) if abs(x) > (1.0 - ROUNDED) * LARGEST else x
+
+    under = [
+        tuple((parameters[n].name, is_open) for (m, n), is_open in orders.items() if m == k)
+        for k in range(len(parameters))
+    ]
+    ends = [(limit(k, up=False), limit(k, up=True)) for k in range(len(parameters))]
+    return [Limits(*both, names) for both, names in zip(ends, under, strict=True)]
 
 
 def _are_near(one: SceneParameter, other: SceneParameter) -> bool:
@@ -136,10 +172,10 @@ def _are_near(one: SceneParameter, other: SceneParameter) -> bool:
     return one.path[:2] == other.path[:2] or "parameters" in tables or tables <= MATERIALS
 
 
-def _ordered(
+def _order(
     trials: _Trials, pair: tuple[SceneParameter, SceneParameter], limits: tuple[Limits, Limits]
-) -> tuple[Limits, Limits] | None:
-    """Limits of two parameters of which one has to be under the other; None if that is not it."""
+) -> bool | None:
+    """Whether one parameter has to be less than another (True), or at most; None if neither."""
     (lower, upper), (below, above) = pair, limits
     high = trials.last(lower, LARGEST, (upper, above.high))
     low = trials.last(upper, -LARGEST, (lower, below.low))
@@ -151,10 +187,7 @@ def _ordered(
             found.add(tuple(trials.accept([(lower, a), (upper, b)]) for a, b in pairs))
     if len(found) != 1 or (order := found.pop())[1:] != (False, True):
         return None
-    is_open = not order[0]
-    ends = (high, LARGEST), (low, -LARGEST)
-    high, low = (end if x == np.nextafter(end, 0.0) else x for x, end in ends)
-    return Limits(below.low, high, upper.name, is_open), Limits(low, above.high)
+    return not order[0]
 
 
 def _limit(

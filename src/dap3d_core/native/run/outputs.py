@@ -14,6 +14,7 @@ import attrs
 
 from dap3d_core.assembly.motion.joint_motion import TRANSLATION
 from dap3d_core.assembly.motion.single_coordinate import single_coordinate
+from dap3d_core.formulations.contacts.contact_table import FRICTION, GAP, NORMAL, SLIP
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS
 from dap3d_core.integrators.stepping.integration_state import Y
 from dap3d_core.interface.fields import SLOTS, specs_of
@@ -25,6 +26,7 @@ from dap3d_core.model.state_layout import COORDINATES, VELOCITIES
 from dap3d_core.native.run.elements import Element, Elements
 from dap3d_core.native.run.prepared import PreparedRun, refusal
 from dap3d_core.result import Result, ResultError
+from dap3d_core.result.arrays import POINT
 from dap3d_core.result.errors import UnknownNameError
 from dap3d_core.result.quantities.catalogue import ACTIONS
 from dap3d_core.result.quantities.lookup import find
@@ -123,13 +125,12 @@ def outputs_of(prepared: PreparedRun, names: Sequence[str] | None) -> Outputs:
                 continue
             raise refusal(
                 f"output {name}: {error} is computed by Python alone",
-                "name motions of bodies, points and joints, energies, and expressions of these",
+                "name motions, quantities of joints, forces and contacts, energies, or expressions",
             ) from None
-        ends = [f".{c}" for c in quantity.components] or [""]
         parts = list(value) if isinstance(value, tuple) else [value]
-        for end, part in zip(ends, parts, strict=True):
-            if name + end not in [output.name for output in found]:
-                found.append(Output(name + end, quantity.unit, quantity.label,
+        for word, part in zip(_names_of(name, quantity.components), parts, strict=True):
+            if word not in [output.name for output in found]:
+                found.append(Output(word, quantity.unit, quantity.label,
                                     quantities.is_of_state))  # fmt: skip
                 values.append(part)
     for k, x in enumerate(values):
@@ -150,6 +151,13 @@ def _first_row(prepared: PreparedRun) -> Result:
     """The result of the start alone, for names, units and components."""
     y, text = prepared.run.present.work.state[Y], prepared.compiled.scene_text
     return instant_of(text, prepared.evaluator, 0.0, y)
+
+
+def _names_of(name: str, components: Sequence[str]) -> list[str]:
+    """Names of the numbers of a quantity; of a contact with several points those of the points."""
+    owner, _, attribute = name.rpartition(".")
+    of_points = [f"{one}.{attribute}" for one in components if one.startswith(owner + POINT)]
+    return of_points or [f"{name}.{one}" for one in components] or [name]
 
 
 class _Quantities:
@@ -184,6 +192,8 @@ class _Quantities:
         if system is not None:
             return system()
         whole, _, component = name.rpartition(".")
+        if len(points := self._result.summary.contacts.get(whole, ())) > 1:
+            return tuple(self.value(f"{point}.{component}") for point in points)
         for owner, slot, attribute in self._parsed(name):
             return self._of_owner(owner, slot, attribute, name)
         if whole in self._result.outputs or list(self._parsed(whole)):
@@ -213,6 +223,16 @@ class _Quantities:
             k = summary.point_index[owner]
             local = tuple(summary.point_local[k].tolist())
             return self._of_point(int(summary.point_body[k]), local, _OF_POINT[attribute])
+        if owner in model.contact_names:
+            self.is_of_state &= attribute in ("gap", "slip")
+        for state in model.element_states:
+            if (state.element, state.name) == (owner, attribute):
+                return self._of_element_state(state.first, state.length)
+        if owner in model.contact_names and attribute in OF_CONTACT:
+            contact = self.elements.contact(owner)
+            first, size = OF_CONTACT[attribute]
+            numbers = tuple(self._values[contact.first + first + k] for k in range(size))
+            return numbers if size > 1 else numbers[0]
         if owner in model.joint_names:
             joint = model.joint_names.index(owner)
             if attribute == "lambda":
@@ -240,6 +260,12 @@ class _Quantities:
         raise NotExportedError(name)
 
     # ---------------------------------------------------------------- joints and forces
+
+    def _of_element_state(self, first: int, length: int) -> Any:
+        """States of elements stand before the work, which is the last of the integrated state."""
+        start = self._report - 1 - len(self._model.initial_states) + first
+        numbers = tuple(self._row[start + k] for k in range(length))
+        return numbers if length > 1 else numbers[0]
 
     def _multipliers(self, joint: int) -> tuple[Any, ...]:
         first, rows = int(self._model.joint_start[joint]), int(self._model.joint_rows[joint])
@@ -424,6 +450,8 @@ class _Quantities:
         return x != 0.0
 
 
+#: Quantities of contacts: first of the numbers that they say of themselves, how many.
+OF_CONTACT = {"gap": (GAP, 1), "normal": (NORMAL, 1), "friction": (FRICTION, 3), "slip": (SLIP, 3)}
 #: Quantities of bodies and points; of these the derivative that they are.
 _OF_BODY = ("r", "p", "rd", "w", "wp", "rdd", "wd", "wpd")
 _OF_POINT = {"r": 0, "v": 1, "a": 2, "rP": 0, "rPd": 1, "rPdd": 2}

@@ -24,8 +24,10 @@ from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.study.batch import initial_state
 from dap3d_core.study.parameters import SceneParameter, with_values
 
-#: Factors on a parameter by which its places in the memory are found, and summands where it is 0.
-TRIALS = (1.001, 0.9975)
+#: Factors on a parameter by which its places in the memory are found, and summands where it is 0:
+#: the first two that the scene accepts, which may be at a limit.
+TRIALS = (1.001, 0.9975), (1.001, 1.0025), (0.999, 0.9975)
+TRIALS_OF_ZERO = (1.001, 0.9975), (1e-3, 2.5e-3), (-1e-3, -2.5e-3)
 #: What follows from other numbers at the start of a run.
 DERIVED = frozenset(("metric", "smallest", "F", "start", "0.mass_inverse", "0.Jp_inverse"))
 #: The remedy for parameters that cannot be set.
@@ -60,15 +62,7 @@ def places_of(
     name, value = parameter.name, parameter.value
     if value is None:
         raise refusal(f"parameter {name} has no number in the scene", "give it one")
-    trials = [value * factor if value else factor for factor in TRIALS]
-    scene = prepared.compiled.scene
-    try:
-        others = [PreparedRun(with_values(scene, [parameter], [x]), **options) for x in trials]
-    except (SceneError, SimulationError, PluginError, ModelError) as error:
-        why = str(error).splitlines()[0].rstrip(":")
-        if isinstance(error, SceneError):
-            why = error.mistakes[0].what
-        raise _fixed(name, f"a value near its own is refused: {why}") from error
+    trials, others = _trials(prepared, parameter, value, options)
     if any(one.stops != prepared.stops for one in others):
         raise _fixed(name, "it moves a break point of a function, where steps end")
     if any(outputs_of(one, outputs.names).text != outputs.text for one in others):
@@ -84,6 +78,29 @@ def places_of(
         why = "the start depends on it, and compiled code does not correct it as Python does"
         raise _fixed(name, why)
     return Places(words, bool(moved), moves_start)
+
+
+def _trials(
+    prepared: PreparedRun, parameter: SceneParameter, value: float, options: dict[str, Any]
+) -> tuple[list[float], list[PreparedRun]]:
+    """Two other values of a parameter, and the runs with these.
+
+    Raises:
+        SceneError: neither values about its own nor those on one side are accepted.
+    """
+    scene, refused = prepared.compiled.scene, None
+    for factors in TRIALS if value else TRIALS_OF_ZERO:
+        values = [value * factor if value else factor for factor in factors]
+        try:
+            found = [PreparedRun(with_values(scene, [parameter], [x]), **options) for x in values]
+        except (SceneError, SimulationError, PluginError, ModelError) as error:
+            refused = refused or error
+            continue
+        return values, found
+    why = str(refused).splitlines()[0].rstrip(":")
+    if isinstance(refused, SceneError):
+        why = refused.mistakes[0].what
+    raise _fixed(parameter.name, f"a value near its own is refused: {why}") from refused
 
 
 def _fixed(name: str, why: str, remedy: str = EXPORT_EACH) -> SceneError:

@@ -57,6 +57,20 @@ def refusal(what: str, remedy: str = "") -> SceneError:
     return SceneError([Mistake("export", MISSING, what, remedy=remedy)])
 
 
+def _require_bodies(evaluator: Evaluator, what: str) -> None:
+    """Refuse coordinates of joints, in which Python finds what is behind an event.
+
+    Raises:
+        SceneError: they are the coordinates of the run.
+    """
+    if not evaluator.coordinates.are_of_bodies:
+        raise refusal(
+            f"{what}, and Python alone brings that into joint coordinates (method joint, which "
+            "auto takes for large trees)",
+            'set method = "lsq" in [simulation], or give it to export_model',
+        )
+
+
 @attrs.frozen
 class Stop:
     """An instant that no step goes over (simulation/initial/breakpoints.py).
@@ -132,11 +146,7 @@ class JumpCode:
         Raises:
             SceneError: it cannot be exported.
         """
-        if not evaluator.coordinates.are_of_bodies:
-            raise refusal(
-                f"velocities jump, which exported models of method {evaluator.method} do not",
-                "export it by method standard or lsq",
-            )
+        _require_bodies(evaluator, "velocities jump")
         law = JumpLaw(evaluator)
         contact = UncarriedContact(evaluator, law)
         if contact.is_bare.any():  # Python sees contact that stays, and ends the run
@@ -173,12 +183,7 @@ class ContactCode:
         Raises:
             SceneError: it cannot be exported.
         """
-        if not evaluator.coordinates.are_of_bodies:
-            raise refusal(
-                f"events of contacts, which exported models of method {evaluator.method} do not "
-                "follow",
-                "export it by method lsq",
-            )
+        _require_bodies(evaluator, "contacts change at events")
         jumps = ContactJumps(evaluator)
         table, arrays = jumps.table, jumps.table.arrays(rounds=1)  # decisions ask if there was one
         arrays.jammed = -1

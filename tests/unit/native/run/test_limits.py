@@ -1,8 +1,17 @@
 """Limits of parameters: those of the checks of a scene."""
 
+from itertools import permutations
+
 import numpy as np
 import pytest
-from tests.unit.native.test_export import SPRING, _written, braced, declared_ball, falling_ball
+from tests.unit.native.test_export import (
+    SPRING,
+    _written,
+    braced,
+    declared_ball,
+    falling_ball,
+    two_floors,
+)
 
 import dap3d_core as dap
 from dap3d_core.native.run.limits import LARGEST, Limits, limits_of
@@ -58,8 +67,32 @@ def test_of_two_in_order_one_is_under_the_other(tmp_path):
     scene.add_function("b", "push", x_start=0.1, x_end=0.5, f_end=1.0)
     scene.add_force("f", "kick", body_i="cart", f=(1.0, 0.0, 0.0), function="push")
     found = found_of(scene, "functions.push.x_end", "functions.push.x_start")
-    assert [limits.under for limits in found] == ["", "functions.push.x_end"]
+    assert [limits.under for limits in found] == [(), (("functions.push.x_end", True),)]
     assert found[1].words == ["should be less than functions.push.x_end"]
+
+
+def test_one_that_is_in_two_orders(tmp_path):
+    """Coefficients of two floors above a shared one, in any order of names, and times in a row."""
+    scene = two_floors()
+    names = ["parameters.mu", "contacts.floor_a.mu_s", "contacts.floor_b.mu_s"]
+    for order in permutations(names):
+        found = dict(zip(order, found_of(scene, *order), strict=True))
+        assert {closed(limits) for limits in found.values()} == {(0.0, None)}
+        assert {name for name, is_open in found["parameters.mu"].under if not is_open} == {
+            *names[1:]
+        }
+    assert closed(*found_of(scene, "parameters.mu")) == (0.0, 0.3)
+    scene = _written(SPRING, tmp_path)
+    scene.parameters["middle"] = 0.5
+    scene.add_function("b", "rise", x_start=0.1, x_end="= middle", f_end=1.0)
+    scene.add_function("b", "fall", x_start="= middle", x_end=0.9, f_end=-1.0)
+    for name in ("rise", "fall"):
+        scene.add_force("f", f"kick_{name}", body_i="cart", f=(1.0, 0.0, 0.0), function=name)
+    names = "functions.fall.x_end", "parameters.middle", "functions.rise.x_start"
+    found = found_of(scene, *names)
+    assert [limits.under for limits in found] == [(), ((names[0], True),), ((names[1], True),)]
+    assert {closed(limits) for limits in found} == {(None, None)}
+    assert closed(*found_of(scene, names[1])) == (0.1, 0.9)
 
 
 def test_other_dependence_is_refused_and_inertias_wait(tmp_path):

@@ -74,8 +74,10 @@ def test_what_nothing_carries_is_refused_by_name(tmp_path):
 
 
 def test_a_method_in_coordinates_of_joints_is_refused(tmp_path):
-    with pytest.raises(dap.SceneError, match="method standard or lsq"):
-        exported(swinging(), tmp_path, method="joint")
+    for make, what in ((swinging, "velocities jump"), (door, "contacts change at events")):
+        with pytest.raises(dap.SceneError, match=what) as refused:
+            exported(make(), tmp_path, method="joint")
+        assert 'set method = "lsq" in [simulation]' in str(refused.value)
 
 
 @pytest.mark.slow
@@ -199,6 +201,22 @@ def test_friction_and_restitution_are_parameters(tmp_path):
     run.step_to(1.0)
     scene = thrown()
     scene.contacts["floor"].fields |= {"mu": 0.1, "e": 0.8}
+    result = dap.simulate(scene, t_end=1.0, dt=1.0)
+    expected = np.hstack([result.r[-1, 0], result.rd[-1, 0]])
+    assert np.array_equal(run.values(made.outputs), expected)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "there", "value"), [("e", 0.0, 0.5), ("mu_s", 0.3, 0.4)])
+def test_a_parameter_may_be_at_its_limit_in_the_scene(tmp_path, name, there, value):
+    """Values on one side of it are not accepted, with restitution 0 and mu_s as great as mu."""
+    scene, path = thrown(), f"contacts.floor.{name}"
+    scene.contacts["floor"].fields[name] = there
+    made, library = exported(scene, tmp_path, outputs=["ball.r", "ball.rd"], parameters=[path])
+    run = library.start(1.0)
+    run[path] = value
+    run.step_to(1.0)
+    scene.contacts["floor"].fields[name] = value
     result = dap.simulate(scene, t_end=1.0, dt=1.0)
     expected = np.hstack([result.r[-1, 0], result.rd[-1, 0]])
     assert np.array_equal(run.values(made.outputs), expected)
