@@ -198,7 +198,7 @@ def fit_joints(work: Any, s: StepArrays, turns: bool, system: System, loops: Any
     if not turns:
         copy(state, y)
     give_velocities(state, s.v)
-    evaluate_rows(work.t + (1.0 - part) * s.h, state, s, system, loops)
+    evaluate_rows(work.t + (1.0 - part) * s.h, state, False, s, system, loops)
     for k in range(s.y.size):
         row = system.row[k]
         s.free_speed[k] = system.nu[row] + part * s.h * system.gamma[row]
