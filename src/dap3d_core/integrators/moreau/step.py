@@ -72,7 +72,8 @@ SAME_TIME = 1e-9
 RENEWED, FOLLOWED, MOST_STEPS = 3, 2.0, 100
 #: Margin of contacts, as parts of the way of a step, and m of a scene of ordinary size.
 MARGIN, LEAST_MARGIN = 1.2, 1e-6
-#: Gaps and overlaps, m of a scene of ordinary size, of what contacts carry and joints have moved.
+#: Gaps and overlaps, m of a scene of ordinary size, of what contacts carry and joints have moved: a
+#: pass that removes overlaps may leave them for the next step.
 MOVED_BY_JOINTS = 1e-9
 #: What moves by a way x leaves of an overlap x^2 / (2 R), R a tenth of the scene's length: this
 #: times x^2 over the length. The next step sees what is left.
@@ -435,7 +436,7 @@ def part(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     trial, deepest, margin = work.state[at.TRIAL], 0.0, 0.5 * LEAST_MARGIN * s.length
     for b in range(s.margin.size):
         s.margin[b] = margin
-    for _ in range(PASSES):
+    for turn in range(PASSES):
         if not all_finite(trial):  # ``finish`` says so
             break
         if not find_contacts(s.t1, trial, 2.0 * margin, s, system, loops):
@@ -443,7 +444,8 @@ def part(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         deepest = deepest_of(s)
         if s.contact_count > 0 and s.declared_gap.size == 0 and s.y.size > 0:
             evaluate_rows(s.t1, trial, True, s, system, loops)
-        if max(deepest, misfit_of(s, system)) <= OVERLAP * s.length:
+        enough = (MOVED_BY_JOINTS if turn > 0 and s.y.size > 0 else OVERLAP) * s.length
+        if max(deepest, misfit_of(s, system)) <= enough:
             break
         prepare_problem(s)
         for b in range(s.free.shape[0]):
