@@ -307,6 +307,16 @@ def evaluate_rows(
 
 
 @compiled
+def misfit_of(s: StepArrays, system: System) -> float:
+    """How far joints are off where contacts are near, m."""
+    found = 0.0
+    for k in range(s.y.size if s.contact_count > 0 else 0):
+        row = system.row[k]
+        found = max(found, abs(system.residual[row]) * system.weight[row])
+    return found
+
+
+@compiled
 def find_grips(t: float, s: StepArrays, system: System, loops: Any) -> bool:
     """Find coefficients of contacts whose law of friction is their own, at slip of ``before``.
 

@@ -13,6 +13,7 @@ from dap3d_core.integrators.moreau.contact_set import (
     evaluate_rows,
     find_contacts,
     find_grips,
+    misfit_of,
     put_resistances,
     turn_rows,
     velocity_of,
@@ -467,16 +468,6 @@ def part(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
             break
     work.deepest = max(work.deepest, deepest)
     return True
-
-
-@compiled
-def misfit_of(s: StepArrays, system: System) -> float:
-    """How far joints are off where contacts are near, m."""
-    found = 0.0
-    for k in range(s.y.size if s.contact_count > 0 else 0):
-        row = system.row[k]
-        found = max(found, abs(system.residual[row]) * system.weight[row])
-    return found
 
 
 @compiled
