@@ -129,3 +129,28 @@ def test_jellett_s_constant_of_a_top_that_slides_and_rolls(method):
     L = J * w + (J_axis - J) * np.sum(w * axis, axis=1)[:, None] * axis
     constant = -np.sum(L * (a * axis - [0.0, 0.0, radius]), axis=1)
     np.testing.assert_allclose(constant, constant[0], rtol=TOLERANCE)
+
+
+def test_joints_and_overlaps_are_corrected_together():
+    """An arm slides on a plate that shakes: each apart undid the other, and left 1e-8 m and more.
+
+    What is left is at most that which joints may move a contact by (MOVED_BY_JOINTS).
+    """
+    scene = dap.Scene(name="arm on a plate")
+    scene.add_body("arm", mass=1.0, Jp=[0.02] * 3, r=[0.3, 0.0, 0.1])
+    scene.add_point("hip", "ground", [0.0, 0.0, 0.1])
+    scene.add_point("heel", "arm", [-0.3, 0.0, 0.0])
+    scene.add_joint("rev", "pin", P_i="heel", P_j="hip", a_i="arm.y", a_j="ground.y")
+    scene.add_body("plate", mass=1.0, Jp=[0.02] * 3, r=[0.5, 0.0, 0.0])
+    scene.add_function("harmonic", "shake", amplitude=0.02, frequency=30.0)
+    rail = {"P_i": "plate.O", "P_j": "ground.O", "a_j": "ground.z"}
+    scene.add_joint("tran", "rail", **rail)
+    scene.add_joint("drive-tran", "drive", **rail, function="shake")
+    scene.add_shape("sphere", body="arm", radius=0.1, at=[0.2, 0.0, 0.0], collides=True)
+    scene.add_shape("box", body="plate", size=[1.0, 1.0, 0.02], at=[0, 0, -0.01], collides=True)
+    scene.add_material("surface", mu=0.5)
+    scene.add_collisions(material="surface")
+    scene.add_force("weight", "gravity", gravity=30.0)
+    result = dap.simulate(scene, t_end=0.5, dt=0.1, contact_step=1e-3)
+    assert len(result.contacts) > 0
+    assert result.record.stepping["deepest"] < 1e-9

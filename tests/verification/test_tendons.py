@@ -156,26 +156,31 @@ def test_a_joint_tendon_keeps_its_length_through_impacts(e):
     assert abs(x - angle) < h**2 * 9.81 * 0.1 / 0.03
 
 
-@pytest.mark.parametrize("contacts", [False, True])
-def test_a_load_hangs_at_the_limit_of_a_wrapped_tendon(tmp_path, contacts):
-    """A slide falls until the tendon is 1.2 m: by events and by stepping.
+@pytest.mark.parametrize(("contacts", "more"), [(False, ""), (True, ""), (False, "<joint/>")])
+def test_a_load_hangs_at_the_limit_of_a_wrapped_tendon(tmp_path, contacts, more):
+    """A slide falls until the tendon is 1.2 m: by events, by stepping, and by method joint.
 
-    Two tangents of length t and an arc make the length, of points at distances l from the axis.
+    That is for a second joint, whose link has no mass; what the slider, a millionth of the load,
+    leaves of rates there is rounding, of no sum. Two tangents of length t and an arc make the
+    length, of points at distances l from the axis.
     """
     path = tmp_path / "a.xml"
-    path.write_text("""<mujoco><worldbody><site name="hook" pos="-0.3 0 0.4"/>
+    path.write_text(f"""<mujoco><worldbody><site name="hook" pos="-0.3 0 0.4"/>
         <geom name="post" type="cylinder" size="0.1 0.3" euler="90 0 0" contype="0"/>
-        <body pos="0.5 0 0.4"><joint name="p" type="slide" axis="0 0 1"/><geom size="0.05"/>
+        <body name="b" pos="0.5 0 0.4"><joint name="p" type="slide" axis="0 0 1"/>{more}
+        <geom size="0.05"/>
         <site name="end"/></body></worldbody><tendon><spatial range="0.3 1.2"><site site="hook"/>
         <geom geom="post"/><site site="end"/></spatial></tendon></mujoco>""")
     scene, report = dap.import_model(path, contacts=contacts)
     assert not [one for one in report.left_out if one.motion]
+    assert scene.simulation.method == ("joint" if more else "auto")
+    b = list(scene.bodies).index("b")
     steps = {"contact_step": 2e-3} if contacts else {}
     result = dap.simulate(scene, t_end=1.0, dt=0.5, **steps)
-    A, B = np.array([-0.3, 0.4]), np.array([0.5, result.r[-1, 0, 2]])
+    A, B = np.array([-0.3, 0.4]), np.array([0.5, result.r[-1, b, 2]])
     l_a, l_b = np.hypot(*A), np.hypot(*B)
     arc = np.arccos(A @ B / (l_a * l_b)) - np.arccos(0.1 / l_a) - np.arccos(0.1 / l_b)
     assert arc > 0.1
     length = np.sqrt(l_a**2 - 0.01) + np.sqrt(l_b**2 - 0.01) + 0.1 * arc
     assert length == pytest.approx(1.2, abs=1e-8)
-    assert np.abs(result.rd[-1, 0]).max() < 1e-8
+    assert np.abs(result.rd[-1, b]).max() < (1e-6 if more else 1e-8)

@@ -287,9 +287,9 @@ def _limits(builder: SceneBuilder, tendon: Tendon) -> bool:
     """True for a tendon with rigid limits; those that cannot be are left out, remarked."""
     if not tendon.limits.finite:
         return False
-    if builder.limits != "off" and builder.takes_contacts:
+    if builder.limits != "off":
         return True
-    text = "limits of tendons, with limits = off or method joint"
+    text = "limits of tendons, with limits = off"
     builder.remarks.leave_out(tendon.place, text, motion=True)
     return False
 

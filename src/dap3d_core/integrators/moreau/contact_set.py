@@ -59,7 +59,7 @@ def find_contacts(
     for c in range(s.touch_count):
         put_touch(c, s)
     if s.declared_gap.size > 0:
-        evaluate_rows(t, y, s, system, loops)
+        evaluate_rows(t, y, True, s, system, loops)
         for k in range(s.declared_gap.size):
             u = s.declared_under[k]
             if u >= 0:
@@ -85,7 +85,7 @@ def turn_rows(t: float, y: Floats, s: StepArrays, system: System, loops: Any) ->
     """
     shapes, first = s.shapes, s.touch_count
     if s.declared_gap.size + s.y.size > 0:
-        evaluate_rows(t, y, s, system, loops)
+        evaluate_rows(t, y, False, s, system, loops)
     place_poses(y, s)
     if first > 0:
         place_shapes(shapes, s.poses, s.margin)
@@ -283,15 +283,20 @@ def put_frame(x: float, y: float, z: float, J: Floats) -> None:
 
 
 @compiled
-def evaluate_rows(t: float, y: Floats, s: StepArrays, system: System, loops: Any) -> None:
-    """Evaluate rows of joints and of declared contacts, these as if all stuck."""
+def evaluate_rows(
+    t: float, y: Floats, has_gaps: bool, s: StepArrays, system: System, loops: Any
+) -> None:
+    """Evaluate rows of joints and of declared contacts, these as if all stuck.
+
+    has_gaps: ``residual`` of the system becomes their gaps, and what joints are off by, too.
+    """
     place(t, y, system, loops)
     for k in range(s.declared_mode.size):
         first = s.declared_mode[k]
         system.states[first] = STEPPED
         for i in range(3):
             system.states[first + NEAR + i] = 0.0
-    if s.declared_gap.size > 0:
+    if has_gaps:
         residual = system.residual
         zero(residual)
         call_kinds(POSITION, POSITION, t, system, loops, residual, residual, residual)
@@ -299,6 +304,16 @@ def evaluate_rows(t: float, y: Floats, s: StepArrays, system: System, loops: Any
     for q in range(s.row_place.size):
         for k in range(6):
             s.D[q, k] = system.D[s.row_place[q] + k]
+
+
+@compiled
+def misfit_of(s: StepArrays, system: System) -> float:
+    """How far joints are off where contacts are near, m."""
+    found = 0.0
+    for k in range(s.y.size if s.contact_count > 0 else 0):
+        row = system.row[k]
+        found = max(found, abs(system.residual[row]) * system.weight[row])
+    return found
 
 
 @compiled

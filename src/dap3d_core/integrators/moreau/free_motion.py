@@ -144,6 +144,8 @@ def size_of(x: Floats, count: int) -> float:
 def largest_rate(work: Any, s: StepArrays, rhs: Function, system: System, loops: Any) -> float:
     """Largest size of an eigenvalue of df/dy, 1/s, by powers of it; one a call, but at the start.
 
+    There as many as it takes where forces are fast.
+
     ``slopes`` then begins with dy/dt.
     Source: the nonlinear power method of Sommeijer, Shampine, Verwer, RKC: an explicit solver
     for parabolic PDEs (J. Comp. Appl. Math. 88, 1997). Of an oscillation two powers are taken
@@ -172,6 +174,8 @@ def largest_rate(work: Any, s: StepArrays, rhs: Function, system: System, loops:
         for i in range(size):
             change[i] = slope[i] - at_y[i]
         before, found = found, size_of(change, last) / norm
+        if before > 0.0 and max(before, found) * work.fixed_step <= PART:  # by one part, anyway
+            break
     work.last_rate = found
     copy(slope, at_y)
     return math.sqrt(before * found)
@@ -198,7 +202,7 @@ def fit_joints(work: Any, s: StepArrays, turns: bool, system: System, loops: Any
     if not turns:
         copy(state, y)
     give_velocities(state, s.v)
-    evaluate_rows(work.t + (1.0 - part) * s.h, state, s, system, loops)
+    evaluate_rows(work.t + (1.0 - part) * s.h, state, False, s, system, loops)
     for k in range(s.y.size):
         row = system.row[k]
         s.free_speed[k] = system.nu[row] + part * s.h * system.gamma[row]

@@ -323,7 +323,9 @@ def newton(s: StepArrays, tolerance: float, is_reduced: bool, raises: bool = Fal
             exchange(s)
         new = residual_after(s, is_reduced)
         helps = new <= HELPS * left
-        if helps or (raises and new < WORSE * left and weight < MOST_WEIGHT):
+        if helps and is_reduced:
+            weight = most
+        elif helps or (raises and new < WORSE * left and weight < MOST_WEIGHT):
             weight = min(weight / LESS, max(most, weight) if helps else MOST_WEIGHT)
         else:
             weight *= LESS

@@ -39,9 +39,11 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: Weight of joints times the masses that their rows feel.
-STIFF = 1e7
+STIFF = 1e8
 #: Passes of a round at most; to what part of the impulses they are to solve it.
 PASSES, FOUND = 10, 1e-4
+#: Part of the largest impulse up to which one is rounding.
+PUSHES = 1e-12
 #: How weights are taken back, at most.
 LESS, LEAST = 1e-2, 1.0
 
@@ -261,12 +263,14 @@ def try_reduced(s: StepArrays, weight: float, merit: float, feels: float, holds:
     feels: as of ``try_pass``. holds: what pushes is taken to do so still, whatever velocities,
     times a large weight, say; no parts then.
     """
-    m, n, K, step = s.chosen_count, 3 * s.chosen_count, s.small, s.small_step
+    m, n, K, step, largest = s.chosen_count, 3 * s.chosen_count, s.small, s.small_step, 0.0
+    for q in range(m if holds else 0):
+        largest = max(largest, s.x[s.chosen[q], 0])
     for q in range(m):
         c = s.chosen[q]
         B, z, part = s.B[c], s.z[c], weight * s.r[c]
         put_slopes(z, feels * s.mu[c], s.rim[c], s.kind[c], B)
-        if holds and s.kind[c] == CONE and s.x[c, 0] > 0.0:
+        if holds and s.kind[c] == CONE and s.x[c, 0] > PUSHES * largest:
             hold(s, c)
         for r in range(3):
             at, row = n * (3 * q + r), s.felt

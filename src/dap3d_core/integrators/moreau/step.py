@@ -13,6 +13,7 @@ from dap3d_core.integrators.moreau.contact_set import (
     evaluate_rows,
     find_contacts,
     find_grips,
+    misfit_of,
     put_resistances,
     turn_rows,
     velocity_of,
@@ -72,8 +73,12 @@ SAME_TIME = 1e-9
 RENEWED, FOLLOWED, MOST_STEPS = 3, 2.0, 100
 #: Margin of contacts, as parts of the way of a step, and m of a scene of ordinary size.
 MARGIN, LEAST_MARGIN = 1.2, 1e-6
-#: Gaps and overlaps, m of a scene of ordinary size, of what contacts carry and joints have moved.
+#: Gaps and overlaps, m of a scene of ordinary size, of what contacts carry and joints have moved: a
+#: pass that removes overlaps may leave them for the next step.
 MOVED_BY_JOINTS = 1e-9
+#: What moves by a way x leaves of an overlap x^2 / (2 R), R a tenth of the scene's length: this
+#: times x^2 over the length. The next step sees what is left.
+BENDS = 5.0
 #: Times that joints are fitted to the velocities found, where these leave a residual.
 FITS = 3
 #: Stages of a step that waits for room: the trial state is that without contacts; it is that where
@@ -220,7 +225,7 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         if not turn_rows(work.t + 0.5 * s.h, put_middle(work, s), s, system, loops):
             return False
     elif s.declared_gap.size == 0 and s.y.size > 0:
-        evaluate_rows(work.t, y, s, system, loops)
+        evaluate_rows(work.t, y, False, s, system, loops)
     for c in range(s.touch_count if s.resistance_count > 0 else 0):
         put_resistances(c, s)
     if not solve_fitted(work, s, turns, system, loops):
@@ -426,21 +431,23 @@ def work_done(work: Any, s: StepArrays) -> float:
 def part(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     """Move bodies that overlap apart, by the least change in the metric of their masses.
 
-    False without room.
+    What joints are off by is removed together with that: apart each would undo the other. False
+    without room.
     """
     trial, deepest, margin = work.state[at.TRIAL], 0.0, 0.5 * LEAST_MARGIN * s.length
     for b in range(s.margin.size):
         s.margin[b] = margin
-    for _ in range(PASSES):
+    for turn in range(PASSES):
         if not all_finite(trial):  # ``finish`` says so
             break
         if not find_contacts(s.t1, trial, 2.0 * margin, s, system, loops):
             return False
         deepest = deepest_of(s)
-        if deepest <= OVERLAP * s.length:
+        if s.contact_count > 0 and s.declared_gap.size == 0 and s.y.size > 0:
+            evaluate_rows(s.t1, trial, True, s, system, loops)
+        enough = (MOVED_BY_JOINTS if turn > 0 and s.y.size > 0 else OVERLAP) * s.length
+        if max(deepest, misfit_of(s, system)) <= enough:
             break
-        if s.declared_gap.size == 0 and s.y.size > 0:
-            evaluate_rows(s.t1, trial, s, system, loops)
         prepare_problem(s)
         for b in range(s.free.shape[0]):
             zero(s.free[b])
@@ -448,12 +455,17 @@ def part(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
             s.bias[c, 0], s.mu[c] = s.gap[c], 0.0
             s.x[c, 0] = s.x[c, 1] = s.x[c, 2] = s.bias[c, 1] = s.bias[c, 2] = 0.0
         for k in range(s.y.size):
-            s.y[k] = s.free_speed[k] = 0.0
+            s.y[k], s.free_speed[k] = 0.0, -system.residual[system.row[k]]
         if not solve(s, NEAR):
             return False
+        way = 0.0
         for b in range(1, s.v.shape[0]):
             v = s.v[b]
+            way = max(way, length_of(v, 0) + s.length * length_of(v, 3))
             move(trial, coordinate_offset(b), v[0], v[1], v[2], v[3], v[4], v[5])
+        if way * (s.residual + BENDS * way / s.length) <= OVERLAP * s.length:
+            deepest = 0.0  # to that
+            break
     work.deepest = max(work.deepest, deepest)
     return True
 
