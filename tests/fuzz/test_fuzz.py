@@ -54,7 +54,7 @@ def test_more_inputs(name):
                                     4_607_735, 25_774_717, 3_059_079, 342_429,
                                     14_803_168, 2_361_476, 6_831_601, 10_598_367, 2_523_873,
                                     1_016_830, 5_239_751, 2_606_997, 29_006_966,
-                                    18_881_700])  # fmt: skip
+                                    18_881_700, 18_734_821])  # fmt: skip
 def test_contacts_that_once_ended_falsely(number):
     """As "ever faster", by steps as short as rounding, with a force that pulls, or overlapping.
 

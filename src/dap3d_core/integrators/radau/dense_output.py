@@ -6,10 +6,10 @@ both ends of the step, and the start of the step before. Slopes of positions fol
 velocities. Those of velocities are the collocation polynomial's, moved onto D v_dot = gamma, since
 the multipliers of the stages are of order 3.
 
-With more stages, and in a first step, it is the collocation polynomial, whose rates are off by a
-multiple of (x - c_1) ... (x - c_s) and higher terms; that multiple is known at the start of the
-step, where the rates are known, and its integral is taken away. What is left is what the error of
-steps with more stages is held to (integration.py).
+With more stages, and in a first step or behind a short one, it is the collocation polynomial, whose
+rates are off by a multiple of (x - c_1) ... (x - c_s) and higher terms; that multiple is known at
+the start of the step, where the rates are known, and its integral is taken away. What is left is
+what the error of steps with more stages is held to (integration.py).
 """
 
 from dap3d_core.assembly.arrays import VALUE, Floats, states_offset, velocity_offset
@@ -28,9 +28,9 @@ from dap3d_core.integrators.radau.tableau import FEWEST
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, TRIAL, Y
 from dap3d_core.kernels.runtime.cache import compiled
 
-#: A step before that was shorter than this part of the present one says nothing: rounding, divided
-#: by the square, would be seen.
-NEGLIGIBLE = 1e-4
+#: A step before that was shorter than this part of the present one says nothing: rounding of it and
+#: of its rates, divided by the square, would be seen.
+NEGLIGIBLE = 1e-2
 #: A component whose polynomial strays from the inner stages by more than this many of its changes
 #: in the step has a stiff part that has not died away: its slope says nothing beyond some instants,
 #: and it keeps the collocation polynomial.
