@@ -30,7 +30,7 @@ DEPENDENT_NORMALS = 1e-12
 #: Of a change of velocity this part is rounding; velocities that are set are met to this part.
 CANCELLED, HELD = 1e-15, 1e-9
 #: Part of the terms of an acceleration that is rounding of it.
-ROUNDING = 1e-14
+RATE_ROUNDING = 1e-14
 #: Part of the mobilities of both, or of a joint, by which a contact feels a force.
 FELT = 1e-14
 
@@ -236,7 +236,7 @@ def put_free(t: float, s: ContactArrays, system: System, loops: Any, functions: 
         bent = s.arm[i // 3] * system.gamma[system.row[own + i]]
         s.free[i] = rate - bent
         terms = size_along_bodies(i // 3, s.J[own + i], out, system) + abs(bent)
-        if i % 3 == 0 and abs(s.free[i]) <= ROUNDING * terms:
+        if i % 3 == 0 and abs(s.free[i]) <= RATE_ROUNDING * terms:
             s.free[i] = 0.0  # what falls together does not press
     s.is_free = 1
 
