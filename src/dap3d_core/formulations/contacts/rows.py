@@ -29,6 +29,8 @@ DEPENDENT = 1e-6
 DEPENDENT_NORMALS = 1e-12
 #: Of a change of velocity this part is rounding; velocities that are set are met to this part.
 CANCELLED, HELD = 1e-15, 1e-9
+#: Part of the terms of an acceleration that is rounding of it.
+RATE_ROUNDING = 1e-14
 #: Part of the mobilities of both, or of a joint, by which a contact feels a force.
 FELT = 1e-14
 
@@ -105,6 +107,17 @@ def along_bodies(c: int, row: Floats, other: Floats, system: System) -> float:
         o = 6 * system.contacts[c, side] - 6
         for k in range(o, o + 6 if o >= 0 else o):
             total += row[k] * other[k]
+    return total
+
+
+@compiled
+def size_along_bodies(c: int, row: Floats, other: Floats, system: System) -> float:
+    """The sum of the magnitudes of the terms of ``along_bodies``."""
+    total = 0.0
+    for side in range(BODY_I, BODY_J + 1):
+        o = 6 * system.contacts[c, side] - 6
+        for k in range(o, o + 6 if o >= 0 else o):
+            total += abs(row[k] * other[k])
     return total
 
 
@@ -220,7 +233,11 @@ def put_free(t: float, s: ContactArrays, system: System, loops: Any, functions: 
     call_kinds(ACCELERATION, ACCELERATION, t, system, loops, system.D, system.gamma, system.nu)
     for i in range(s.free.shape[0]):
         rate = along_bodies(i // 3, s.J[own + i], out, system)
-        s.free[i] = rate - s.arm[i // 3] * system.gamma[system.row[own + i]]
+        bent = s.arm[i // 3] * system.gamma[system.row[own + i]]
+        s.free[i] = rate - bent
+        terms = size_along_bodies(i // 3, s.J[own + i], out, system) + abs(bent)
+        if i % 3 == 0 and abs(s.free[i]) <= RATE_ROUNDING * terms:
+            s.free[i] = 0.0  # what falls together does not press
     s.is_free = 1
 
 

@@ -2,14 +2,14 @@
 
 With three stages the collocation polynomial is of order 3 only, while end points of steps are of
 order 5. So dense output is the polynomial of degree 5 with the values and slopes of three of them:
-both ends of the step, and the start of the step before. The first step has its collocation
-polynomial. Slopes of positions follow from the velocities. Those of velocities are the collocation
-polynomial's, moved onto D v_dot = gamma, since the multipliers of the stages are of order 3.
+both ends of the step, and the start of the step before. Slopes of positions follow from the
+velocities. Those of velocities are the collocation polynomial's, moved onto D v_dot = gamma, since
+the multipliers of the stages are of order 3.
 
-With more stages it is the collocation polynomial, whose rates are off by a multiple of
-(x - c_1) ... (x - c_s) and higher terms; that multiple is known at the start of the step, where the
-rates are known, and its integral is taken away. What is left is what the error of such steps is
-held to (integration.py).
+With more stages, and in a first step or behind a short one, it is the collocation polynomial, whose
+rates are off by a multiple of (x - c_1) ... (x - c_s) and higher terms; that multiple is known at
+the start of the step, where the rates are known, and its integral is taken away. What is left is
+what the error of steps with more stages is held to (integration.py).
 """
 
 from dap3d_core.assembly.arrays import VALUE, Floats, states_offset, velocity_offset
@@ -28,9 +28,9 @@ from dap3d_core.integrators.radau.tableau import FEWEST
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, TRIAL, Y
 from dap3d_core.kernels.runtime.cache import compiled
 
-#: A step before that was shorter than this part of the present one says nothing: rounding, divided
-#: by the square, would be seen.
-NEGLIGIBLE = 1e-4
+#: A step before that was shorter than this part of the present one says nothing: rounding of it and
+#: of its rates, divided by the square, would be seen.
+NEGLIGIBLE = 1e-2
 #: A component whose polynomial strays from the inner stages by more than this many of its changes
 #: in the step has a stiff part that has not died away: its slope says nothing beyond some instants,
 #: and it keeps the collocation polynomial.
@@ -93,7 +93,7 @@ def scale_slopes(inverse: Floats, h: float, work: RadauState, metric: Floats,
 def prepare_dense(h: float, work: RadauState) -> None:
     """Terms of dense output from t to the trial state, for ``dense_state``."""
     work.t_dense, work.h_dense = work.t, h
-    if work.stages > FEWEST:
+    if work.stages > FEWEST or work.has_last_step == 0 or work.accepted_step < NEGLIGIBLE * h:
         of_collocation(h, work)
     else:
         of_three_ends(h, work)
@@ -135,7 +135,6 @@ def of_three_ends(h: float, work: RadauState) -> None:
     for k in range(6):
         nodes[k] = float(k % 2)
     q = work.accepted_step / h
-    first = work.has_last_step == 0 or q < NEGLIGIBLE
     for k in range(state.shape[1]):
         y, rise = state[Y, k], state[TRIAL, k] - state[Y, k]
         terms[0, k], terms[1, k] = y, rise
@@ -144,8 +143,6 @@ def of_three_ends(h: float, work: RadauState) -> None:
         b = (stages[1, k] / c[1] - rise) / (1.0 - c[1])
         slope3 = (b - a) / (c[1] - c[0])
         terms[2, k], terms[3, k] = c[0] * slope3 - a, -slope3
-        if first:
-            continue
         r2 = h * state[SLOPE, k] - rise
         r3 = rise - h * state[TRIAL_SLOPE, k] - r2
         square = q * (1.0 + q) * (q * (1.0 + q))

@@ -202,8 +202,8 @@ def end_is_across(
         cut_step(work, at.FOUND, h)
         return True
     find_switch_rates(work, t1, trial, slope, at.FOUND, at.FOUND_RATE, watch, system, loops)
-    if work.cut_attempts >= MAX_SUSPICIONS:
-        return False
+    if work.cut_attempts >= MAX_SUSPICIONS or h < rate_difference(work):
+        return False  # rates over more than the step say nothing of what is within
     part = 1.0
     for k in range(s.shape[1]):
         side = s[at.SIDE, k]
