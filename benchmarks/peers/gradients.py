@@ -231,8 +231,8 @@ def dap3d(mechanism, **fixed):
     from dap3d_core.simulation.run_state import Callbacks
     from dap3d_core.simulation.settings import settings_of
     from dap3d_core.study.parameters import parameters_named
-    from dap3d_core.study.sensitivities.neighbours import arrays_of, neighbours_of, run_beside
     from dap3d_core.study.sensitivities.differentiated_run import DifferentiatedRun
+    from dap3d_core.study.sensitivities.neighbours import arrays_of, neighbours_of, run_beside
 
     change_over.LOAD_AFTER, change_over.MAKE_AFTER, change_over.BESIDE = 0.0, 0.0, False
     compiled = dap.compile(dap3d_peer.scene_of(mechanism), method="joint")
