@@ -95,6 +95,7 @@ NOT_CALLED = {
         "integrators.radau.step": "reject_iteration stage_is_across blame",
         "integrators.radau.newton": "find_slopes",  # of differentiated code, as the next one is
         "integrators.radau.convergence": "change_of_slopes",
+        "integrators.stepping.event_location": "has_jumped first_across",  # the same
         "integrators.stepping.rounding": "measure_noise",
         "assembly.turns": "measure_all follow_poses",
         "formulations.regularised": "least_multipliers take_seen",
