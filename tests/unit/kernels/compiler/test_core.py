@@ -95,14 +95,13 @@ NOT_CALLED = {
         "integrators.radau.step": "reject_iteration stage_is_across blame",
         "integrators.radau.newton": "find_slopes",  # of differentiated code, as the next one is
         "integrators.radau.convergence": "change_of_slopes",
-        "integrators.stepping.event_location": "has_jumped first_across",  # the same
         "integrators.stepping.rounding": "measure_noise",
         "assembly.turns": "measure_all follow_poses",
         "formulations.regularised": "least_multipliers take_seen",
         "formulations.stabilized_index2.jacobian": "bridge_bends move sizes_of",
         "integrators.stepping.output": "report_end",
         "integrators.runge_kutta.step": "is_rounding",
-        "integrators.stepping.event_location": "cut_step",
+        "integrators.stepping.event_location": "cut_step has_jumped first_across",
         "linear.rank.null_space": "solve_each",
         "study.batch.initial_state": "keep put_back",  # of differentiated code
         # of jumps with closed forms: unit/formulations/jumps, unit/simulation/events
