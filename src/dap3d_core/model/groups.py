@@ -41,7 +41,7 @@ class Group:
     """All instances of a type in a model.
 
     Attributes:
-        examined: the type, its layout and names.
+        type_info: the type, its layout and names.
         members: (m,) their places among the scene's elements of this kind.
         bodies: (m, slots) body indices, ground 0.
         functions: (m, functions) rows of F, 0 for an absent function; then the bodies of vectors

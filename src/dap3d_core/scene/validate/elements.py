@@ -60,7 +60,7 @@ class Reader:
     """Reads the elements of one type.
 
     Args:
-        examined: the type.
+        type_info: the type.
         table: joints, forces or functions.
         geometry: resolves references to points, vectors and bodies.
         report: takes mistakes and notes.

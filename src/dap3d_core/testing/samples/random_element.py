@@ -67,7 +67,7 @@ class Kernels:
     """The kernels of a type, or of a variant, for elements in a state.
 
     Attributes:
-        examined: the type, with known functions of an argument.
+        type_info: the type, with known functions of an argument.
         crossing: of all switches, for jumps: +1 or -1 where they have crossed to that side, or 0.
     """
 
@@ -249,7 +249,7 @@ def draw(
     """An element with random fields, prepared for the poses of a state.
 
     Args:
-        examined: the type, with known functions of an argument.
+        type_info: the type, with known functions of an argument.
         choices: given values of choices.
         rng: random numbers.
         state: the poses, and the functions of time.

@@ -135,7 +135,7 @@ class SampledType:
     """A type, or a variant of it, with its random samples.
 
     Attributes:
-        examined: the type or variant, with known functions of an argument.
+        type_info: the type or variant, with known functions of an argument.
         choices: values of fields of the variant.
         seed, poses: of the samples, and the number of each sort.
     """
