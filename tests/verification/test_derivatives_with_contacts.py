@@ -253,6 +253,6 @@ def test_slip_from_rest_has_no_derivative():
     scene.add_force("f", "pull", body_i="ball", f=[20.0, 0.0, 0.0])
     settings = TIGHT | {"t_end": 0.2, "dt": 0.1}
     found = dap.sensitivities(scene, ["bodies.ball.mass"], **settings)
-    assert np.isfinite(found.final("ball.r.x")).all()
+    assert np.array_equal(found.result.u, dap.simulate(scene, **settings).u)
     with pytest.raises(dap.SimulationError, match=r"r_dot\.y: contact floor begins to slide"):
         dap.sensitivities(scene, ["bodies.ball.r_dot.y"], **settings)

@@ -173,7 +173,7 @@ class DifferentiatedRun(Run):
                 what = f"there is no derivative of what happens at t = {work.t:.9g} s"
                 raise SimulationError(f"{what}: {failures[-1]}") from failures[-1]
             if change is type(of).begin:
-                self._refuse_slip_from_rest(put, slopes)
+                self._refuse_slip_from_rest(slopes)
             self.instants[float(work.t)] = of_time
             self._differentiation.take()
             self._slopes_of(work.state)[: work.state.shape[1]] = slopes
@@ -208,19 +208,18 @@ class DifferentiatedRun(Run):
         slopes[found] = 0.0
         return int(found[0]) if len(found) else -1
 
-    def _refuse_slip_from_rest(self, put: Callable[[Run], None], slopes: Floats) -> None:
+    def _refuse_slip_from_rest(self, slopes: Floats) -> None:
         """Where a contact begins to slide from rest, the least slip decides in which direction.
 
-        Args:
-            put: as of ``_putting``, before velocities have jumped.
-            slopes: (size, p) derivatives of the state.
+        slopes: (size, p) derivatives of the state there.
 
         Raises:
             SimulationError: a parameter gives it some.
         """
-        of, y = self.jumps, self.present.work.state[Y].copy()
+        of, put, y = self.jumps, self._putting(), self.present.work.state[Y].copy()
         assert of is not None
         sliding = of.sliding_from_rest(self.present)
+        put(self)
         if not sliding:
             return
 
@@ -241,8 +240,6 @@ class DifferentiatedRun(Run):
                         "begins to slide from rest, and the least slip would decide in which "
                         "direction; give it some at the start"
                     )
-        put(self)
-        self.present.work.state[Y] = y
 
     def _name_of(self, switch: int) -> str:
         return self.evaluator.switches[switch].name(self.evaluator.model)
