@@ -23,7 +23,7 @@ COUNTS = {
     "commands": (3, 15),
     "programs": (3, 20),
     "contacts": (1, 10),
-    "gradients": (1, 5),
+    "gradients": (1, 2),
 }
 
 
