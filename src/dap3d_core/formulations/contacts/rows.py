@@ -235,9 +235,10 @@ def put_free(t: float, s: ContactArrays, system: System, loops: Any, functions: 
         rate = along_bodies(i // 3, s.J[own + i], out, system)
         bent = s.arm[i // 3] * system.gamma[system.row[own + i]]
         s.free[i] = rate - bent
-        terms = size_along_bodies(i // 3, s.J[own + i], out, system) + abs(bent)
-        if i % 3 == 0 and abs(s.free[i]) <= RATE_ROUNDING * terms:
-            s.free[i] = 0.0  # what falls together does not press
+        if i % 3 == 0:
+            terms = size_along_bodies(i // 3, s.J[own + i], out, system) + abs(bent)
+            if abs(s.free[i]) <= RATE_ROUNDING * terms:
+                s.free[i] = 0.0  # what falls together does not press
     s.is_free = 1
 
 

@@ -124,9 +124,7 @@ class DifferentiatedRun(Run):
             place, t = int(np.flatnonzero(work.crossings[:, 0] == row[0])[0]), float(row[0])
             slopes = self._slopes_of(work.crossings)[3 * place].copy()
             if np.isnan(slopes).any():
-                name = self._name_of(int(row[1]))
-                what = f"there is no derivative of the instant t = {t:.9g} s"
-                raise SimulationError(f"{what}: the switch of {name} jumps there")
+                raise self._none_of(t, int(row[1]))
             self.instants[t] = slopes
         return type(integration).rows(integration)
 
@@ -219,7 +217,7 @@ class DifferentiatedRun(Run):
         of, put, y = self.jumps, self._putting(), self.present.work.state[Y].copy()
         assert of is not None
         sliding = of.sliding_from_rest(self.present)
-        put(self)
+        put(self)  # as it was: steps read what is in the system
         if not sliding:
             return
 
@@ -241,8 +239,11 @@ class DifferentiatedRun(Run):
                         "direction; give it some at the start"
                     )
 
-    def _name_of(self, switch: int) -> str:
-        return self.evaluator.switches[switch].name(self.evaluator.model)
+    def _none_of(self, t: float, k: int) -> SimulationError:
+        """The error where the instant of switch k has no derivative."""
+        name = self.evaluator.switches[k].name(self.evaluator.model)
+        what = f"there is no derivative of the instant t = {t:.9g} s"
+        return SimulationError(f"{what}: the switch of {name} jumps there")
 
     def _rates_before(self, put: Callable[[Run], None], given: Floats) -> Floats:
         """dy/dt just before a switch has jumped; given: state and time."""
@@ -291,8 +292,7 @@ class DifferentiatedRun(Run):
 
         found = self._derivative(delay, given, slopes, slice(0, -2))[0]
         if np.isnan(found).any():
-            what = f"there is no derivative of the instant t = {given[-1]:.9g} s"
-            raise SimulationError(f"{what}: the switch of {self._name_of(k)} jumps there")
+            raise self._none_of(given[-1], k)
         return found
 
     def _offset_of(self, run: Run) -> tuple[float, int]:
