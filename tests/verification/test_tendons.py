@@ -160,8 +160,7 @@ def test_a_joint_tendon_keeps_its_length_through_impacts(e):
 def test_a_load_hangs_at_the_limit_of_a_wrapped_tendon(tmp_path, contacts, more):
     """A slide falls until the tendon is 1.2 m: by events, by stepping, and by method joint.
 
-    That is for a second joint, whose link has no mass; what the slider, a millionth of the load,
-    leaves of rates there is rounding, of no sum. Two tangents of length t and an arc make the
+    That is for a second joint, whose link has no mass. Two tangents of length t and an arc make the
     length, of points at distances l from the axis.
     """
     path = tmp_path / "a.xml"
@@ -183,4 +182,5 @@ def test_a_load_hangs_at_the_limit_of_a_wrapped_tendon(tmp_path, contacts, more)
     assert arc > 0.1
     length = np.sqrt(l_a**2 - 0.01) + np.sqrt(l_b**2 - 0.01) + 0.1 * arc
     assert length == pytest.approx(1.2, abs=1e-8)
-    assert np.abs(result.rd[-1, b]).max() < (1e-6 if more else 1e-8)
+    assert np.abs(result.rd[-1, b]).max() < 1e-8
+    assert result.stats.steps < 1000  # it hangs there still

@@ -44,13 +44,17 @@ from dap3d_core.formulations.joint.place import place_tree
 from dap3d_core.formulations.joint.reduce import reduce_nodes
 from dap3d_core.formulations.joint.spread import body_accelerations, spread_tree
 from dap3d_core.formulations.joint_loops import kept_rows, layout
-from dap3d_core.formulations.joint_loops.equations import factorise, power_of_kept_drivers, solve
+from dap3d_core.formulations.joint_loops.equations import (
+    factorise,
+    power_of_kept_drivers,
+    solve,
+    solve_kept,
+)
 from dap3d_core.formulations.joint_loops.loads import (
     lacking_accelerations,
     linearise_kept,
     push_freedoms,
 )
-from dap3d_core.formulations.joint_loops.profile import solve_profile
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 __all__ = ["accepted", "project", "report", "rhs", "watch"]
@@ -82,7 +86,7 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     power = reduce_nodes(system, system.force, True)
     factorise(system)
     lacking_accelerations(system)
-    solve_profile(system)
+    solve_kept(system)
     push_freedoms(system)
     return power + power_of_kept_drivers(system)
 
@@ -157,7 +161,7 @@ def find_multipliers(system: System, loaded: bool) -> None:
         solve_all(system)
     else:
         lacking_accelerations(system)
-        solve_profile(system)
+        solve_kept(system)
         store_kept(system)
 
 

@@ -139,7 +139,7 @@ def have_come_to_hold(system: System) -> bool:
     for j in range(kept.profile.shape[0]):
         kept.solution[j] = kept.matrix[kept.profile[j, layout.PLACE] + j]
     multiply_loads(system)
-    weigh_kept_rows(system, kept.settings[layout.PART_OF_ROW] / LESS)
+    weigh_kept_rows(system, kept.settings[layout.PART_OF_FACTORS] / LESS)
     factor_profile(system)
     for j in range(kept.profile.shape[0]):
         inverse = kept.matrix[kept.profile[j, layout.PLACE] + j]

@@ -13,6 +13,6 @@ PAIR_NODE, LEFT_LOADS, RIGHT_LOADS, LEFT, RIGHT, LEFT_COUNT, RIGHT_COUNT, PAIR_W
 #: Of ``profile``: first row that a row couples with; place of column 0 of the row in ``matrix``.
 COUPLED, PLACE, PROFILE_WIDTH = range(3)
 
-#: Index in ``settings``: 0.0 where rows are independent, else the part of a row's square that is
-#: its compliance.
-PART_OF_ROW = 0
+#: Of ``settings``: 0.0 where rows are independent, else the part of a row's square that is
+#: its compliance; that of the present factors, which is less where passes did not converge.
+PART_OF_ROW, PART_OF_FACTORS = range(2)

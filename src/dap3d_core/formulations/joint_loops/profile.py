@@ -35,6 +35,7 @@ def weigh_kept_rows(system: System, part: float) -> None:
     times what the row feels, and no pass would come near the rows.
     """
     kept = system.tree.kept
+    kept.settings[layout.PART_OF_FACTORS] = part
     for j in range(kept.compliance.shape[0]):
         kept.compliance[j] = 0.0
     if part == 0.0:
@@ -90,8 +91,11 @@ def factor_profile(system: System) -> bool:
 
 
 @compiled
-def solve_profile(system: System) -> None:
-    """``multipliers`` for what is lacking in ``right``: (S + E) lambda = right, refined by E."""
+def solve_profile(system: System) -> float:
+    """``multipliers`` for what is lacking in ``right``: (S + E) lambda = right, refined by E.
+
+    Returns the square of the last change, as part of that of the multipliers.
+    """
     kept = system.tree.kept
     right, x, z, E = kept.right, kept.multipliers, kept.solution, kept.compliance
     size = x.shape[0]
@@ -101,8 +105,8 @@ def solve_profile(system: System) -> None:
     for k in range(size):
         x[k] = z[k]
     if size == 0 or E[0] == 0.0:
-        return
-    before = np.inf
+        return 0.0
+    change, total, before = 0.0, 0.0, np.inf
     for _ in range(1, SOLVES):
         for k in range(size):
             z[k] = right[k] + E[k] * x[k]
@@ -114,8 +118,9 @@ def solve_profile(system: System) -> None:
             total = where(of_all > total, of_all, total)
             x[k] = z[k]
         if not change > PROFILE_ROUNDING * total or not change < FALLING * before:
-            return
+            break
         before = change
+    return change / total if total > 0.0 else 0.0
 
 
 @compiled_into

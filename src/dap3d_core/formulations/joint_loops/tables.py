@@ -178,7 +178,7 @@ def kept_row_arrays(
             name: np.zeros(count)
             for name in ("compliance", "right", "solution", "multipliers", "smallest")
         },
-        settings=np.zeros(1),
+        settings=np.zeros(2),
     )
 
 

@@ -132,3 +132,22 @@ def test_joints_that_end_beside_contacts_keep_body_coordinates():
     scene.add_contact("ball_plane", "floor", P_i="tip", radius=0.05, mu=0.2)
     with pytest.raises(dap.SimulationError, match="use lsq or auto"):
         dap.simulate(scene, t_end=0.5, method="joint")
+
+
+@pytest.mark.parametrize("ratio", [1e-4, 1e-6, 1e-8])
+def test_a_load_hangs_on_a_stop_by_a_light_slider(ratio):
+    """A rod to a slider of that part of its mass, which a limit holds: nothing moves.
+
+    Rows of the slider alone have 1/ratio in common, of which joint coordinates see the rounding.
+    """
+    scene = dap.Scene(name="hoist")
+    scene.add_body("load", mass=0.5, Jp=(0.001,) * 3, r=(0.0, 0.0, -0.4))
+    scene.add_body("slider", mass=0.5 * ratio, Jp=(0.001 * ratio,) * 3, r=(0.3, 0.0, 0.0))
+    scene.add_force("weight", "gravity", gravity=g)
+    scene.add_joint("tran", "rail", P_i="load.O", P_j="ground.O", a_j="ground.z")
+    scene.add_joint("tran", "way", P_i="slider.O", P_j="ground.O", a_j="ground.x", lower=0.0)
+    scene.add_joint("sph-sph", "rod", P_i="load.O", P_j="slider.O", length=0.5)
+    for result in both(scene, t_end=1e-3, dt=1e-3, rtol=1e-8, atol=1e-10):
+        pulls = result.reaction("rod")["i"].force[:, 2]
+        assert pulls == pytest.approx(0.5 * g, rel=max(1e-12, 1e-15 / ratio))
+        assert np.abs(result.rdd).max() < 2.0 * g * max(1e-12, 1e-15 / ratio)
