@@ -35,11 +35,12 @@ ENDS, BEGINS, UNSEEN, JUMPS, MODE_ENDS = 1, 0, -1, 2, 3
 # often the multipliers did not settle with friction, the numbers of the penalty formulation, how
 # often a pose was singular where something was reported, the length that tolerances speak of
 # (Model.length), 1.0 where pivots are those of equal masses, a scratch number of angles whose turns
-# are in doubt, and 1.0 where forces read reactions: multipliers that do not settle end a run.
+# are in doubt, 1.0 where forces read reactions: multipliers that do not settle end a run; and 1.0
+# where masses or moments of inertia make some rows weak.
 (
     TOLERANCE_C, TOLERANCE_V, SCRATCH, UNSETTLED, ALPHA, OMEGA, MU, SINGULAR, LENGTH, EVEN,
-    DOUBTFUL, JAMS, SETTINGS
-) = range(13)  # fmt: skip
+    DOUBTFUL, JAMS, WEAK, SETTINGS
+) = range(14)  # fmt: skip
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)

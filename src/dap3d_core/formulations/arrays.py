@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import EVEN, KINDS, LENGTH, Floats, Integers, System
+from dap3d_core.assembly.arrays import EVEN, KINDS, LENGTH, WEAK, Floats, Integers, System
 from dap3d_core.assembly.metric import METRIC_WIDTH
 from dap3d_core.assembly.turns import (
     BODY_I,
@@ -37,6 +37,9 @@ ROW_VECTORS = ("gamma", "nu", "residual", "multipliers", "right_side", "total", 
 #: Ratio of masses from which on a pivot falls by as much when a light body turns round a heavy one
 #: as it does near a singular pose.
 UNEVEN = 1e3
+#: Ratio of masses, and of moments of inertia by the size of the parts, from which on passes of
+#: regularised rows may leave some of them (formulations/regularised.py).
+VERY_UNEVEN = 1e5
 
 
 def build_loops(
@@ -99,6 +102,7 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
             [
                 *(1e-15, 1e-15, 0.0, 0.0, *PENALTY, 0.0, model.length, masses_differ(model), 0.0),
                 float(any(group.read for group in model.forces)),
+                rows_are_weak(model),
             ]
         ),
         friction=np.zeros(_friction_size(model, plan)),
@@ -220,6 +224,7 @@ def load_numbers(
     system.body[1:, JP : JP + 9] = other.Jp.reshape(-1, 9)
     set_metric(system.metric, other.mass, other.Jp)
     system.settings[[LENGTH, EVEN]] = other.length, masses_differ(other)
+    system.settings[WEAK] = rows_are_weak(other)
     return regrouped(model, other, what)
 
 
@@ -256,6 +261,15 @@ def masses_differ(model: Model) -> float:
     if not model.body_count:
         return 0.0
     return float(np.max(model.mass) > UNEVEN * np.min(model.mass))
+
+
+def rows_are_weak(model: Model) -> float:
+    """1.0 where masses or moments of inertia may make rows weak (VERY_UNEVEN), else 0.0."""
+    if not model.body_count:
+        return 0.0
+    moments = np.linalg.eigvalsh(model.Jp) / model.part_size**2
+    least = min(np.min(model.mass), np.min(moments))
+    return float(max(np.max(model.mass), np.max(moments)) > VERY_UNEVEN * least)
 
 
 def set_metric(metric: Floats, mass: Floats, Jp: Floats) -> None:

@@ -4,23 +4,28 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import EVEN, Floats, System
-from dap3d_core.assembly.evaluate import copy, largest, zero
+from dap3d_core.assembly.arrays import EVEN, LENGTH, WEAK, Floats, System
+from dap3d_core.assembly.evaluate import copy, global_accelerations, largest, zero
 from dap3d_core.formulations.common.constraints import (
     PART,
     acceleration_residual,
+    factorise,
     factorise_regularised,
     solve_equations,
     solve_rows,
 )
 from dap3d_core.formulations.common.friction import has_friction
 from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.scalar_math import where
 from dap3d_core.linear.ldlt.factor import weigh_rows
 
 #: How often the rows are solved.
 SOLVES = 3
 #: The same, at most, where masses differ much; and how much less of a residual a pass is to leave.
 MORE_SOLVES, FALLING = 12, 0.5
+#: What passes may leave of the rows, as a part of the largest acceleration; how much smaller parts
+#: are where they leave more, and how much of it these are to take away; the least part.
+ROUGH, WEAKER, LESS, WEAKEST = 1e-11, 1e-2, 0.1, 1e-13
 #: For the least multipliers: e w as part of the longest row's square, and passes at most. D^T may
 #: see this part of what is taken away; else e is smaller, by so much at a time, to a least one.
 LEAST_PART, LEAST_SOLVES = 1e-4, 50
@@ -46,15 +51,63 @@ def solve(system: System) -> None:
     zero(system.total)
     for _ in range(SOLVES):
         add_pass(system)
-    left, before = np.inf, np.inf
-    for _ in range(MORE_SOLVES if system.settings[EVEN] != 0.0 else 0):
-        before, left = left, acceleration_residual(system)
-        if not left < FALLING * before:
-            break
-        add_pass(system)
+    left = 0.0
+    if system.settings[EVEN] != 0.0 or system.settings[WEAK] != 0.0:
+        left = add_passes(system, MORE_SOLVES)
+    if system.settings[WEAK] != 0.0 and left > ROUGH * system.settings[LENGTH]:
+        solve_weak_rows(system, left)
     copy(system.multipliers, system.total)
     if has_friction(system):
         least_multipliers(system)
+
+
+@compiled
+def add_passes(system: System, most: int) -> float:
+    """Passes, while each leaves much less of the rows; what is left, m/s^2."""
+    left, passes = acceleration_residual(system), 0
+    before = np.inf
+    while passes < most and left < FALLING * before:
+        add_pass(system)
+        before, left = left, acceleration_residual(system)
+        passes += 1
+    return left
+
+
+@compiled
+def size_of_accelerations(system: System) -> float:
+    """The largest acceleration, m/s^2, those of rotation times the length of the scene."""
+    v_dot, length, size = system.velocity, system.settings[LENGTH], 0.0
+    global_accelerations(system.metric, system.acceleration, v_dot)
+    for k in range(6 * (system.metric.shape[0] - 1)):
+        part = abs(v_dot[k]) * (1.0 if k % 6 < 3 else length)
+        size = where(part > size, part, size)
+    return size
+
+
+@compiled
+def solve_weak_rows(system: System, left: float) -> None:
+    """Solve for what passes have ``left``, by factors of smaller parts.
+
+    Rows that move light bodies, or such that turn easily, much more than the others that they join
+    are independent by little, of which passes leave nearly all. Rows that contradict each other
+    leave as much by any part, and their multipliers are the larger the smaller it is: the passes
+    before are taken.
+    """
+    best, total, part, limit = system.velocity, system.right_side, PART, ROUGH
+    limit *= size_of_accelerations(system)
+    copy(best, system.acceleration)
+    copy(total, system.total)
+    while left > limit and part > WEAKEST:
+        part *= WEAKER
+        factorise(system, part)
+        now = add_passes(system, MORE_SOLVES)
+        if now < LESS * left:
+            left = now
+            copy(best, system.acceleration)
+            copy(total, system.total)
+    copy(system.acceleration, best)
+    copy(system.total, total)
+    factorise(system, PART)
 
 
 @compiled
