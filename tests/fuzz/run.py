@@ -29,7 +29,8 @@ BATCH, PATIENCE = 25, 300
 #: Targets of the coverage-guided fuzzer, which needs the extra "fuzz" (guided.py).
 GUIDED = ("scene-bytes", "matlab-bytes")
 HYPOTHESIS = ("scenes", "damaged", "matlab", "models", "results", "numbers", "quantities",
-              "expressions", "commands", "programs", "contacts", "gradients")  # fmt: skip
+              "expressions", "commands", "programs", "contacts", "gradients",
+              "instants")  # fmt: skip
 
 
 def keep(target, data, words, ending):

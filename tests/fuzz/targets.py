@@ -13,6 +13,8 @@ from fuzz.damage import damaged_scenes
 from fuzz.expressions import check_expression, expressions
 from fuzz.gradients import check_gradients
 from fuzz.gradients import numbers as numbers_of_gradients
+from fuzz.instants import check_instants
+from fuzz.instants import numbers as numbers_of_instants
 from fuzz.matlab import check_model, damaged_models
 from fuzz.models import check_model_file, damaged_model_files
 from fuzz.numbers import changes, check_change
@@ -80,5 +82,6 @@ TARGETS = {
         Target("programs", sources(), check_program, ".py"),
         Target("contacts", numbers_of_contacts(), check_contacts, ".txt"),
         Target("gradients", numbers_of_gradients(), check_gradients, ".txt"),
+        Target("instants", numbers_of_instants(), check_instants, ".txt"),
     )
 }

@@ -8,6 +8,7 @@ import pytest
 from fuzz.contacts import check_contacts
 from fuzz.gradients import check_gradients
 from fuzz.guided import GUIDED
+from fuzz.instants import check_instants
 from fuzz.targets import TARGETS
 
 #: How many inputs, quick and slow. A scene takes some 50 ms, what is refused some 5 ms.
@@ -24,6 +25,7 @@ COUNTS = {
     "programs": (3, 20),
     "contacts": (1, 10),
     "gradients": (1, 2),
+    "instants": (1, 10),
 }
 
 
@@ -66,6 +68,12 @@ def test_contacts_that_once_ended_falsely(number):
     what gets out of reach beyond a short step, or in a report within the first step of radau.
     """
     assert check_contacts(str(number).encode()) == "done"
+
+
+@pytest.mark.parametrize("number", [20, 47, 58])
+def test_accelerations_that_once_were_wrong(number):
+    """By method lsq, where a body weighs little or turns easily: by 1e-9, 1e-5 and a seventh."""
+    assert check_instants(str(number).encode()) == "same"
 
 
 @pytest.mark.slow
