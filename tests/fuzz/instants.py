@@ -50,7 +50,7 @@ def scene_of(number):
     for joint in scene.joints.values():
         if "length" in joint.fields:
             joint.fields["length"] *= unit
-    first, last = list(scene.bodies)[0], list(scene.bodies)[-1]
+    first, *_, last = [*scene.bodies] * 2
     if first != last and rng.random() < 0.5:
         scene.add_force("ptp", "spring", P_i=f"{first}.O", P_j=f"{last}.O",
                         k=mass * float(10.0 ** rng.uniform(-2, 8)), l0=unit)  # fmt: skip

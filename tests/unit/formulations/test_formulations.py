@@ -62,8 +62,8 @@ def report_of(evaluator, u):
 @pytest.mark.parametrize("moment", [1e-4, 1e-7, 1e-10])
 def test_lsq_holds_a_needle_on_two_hinges(moment):
     """A door falls about its hinges by m g l / (J + m l^2), however easily it turns about an axis
-    across them. To rounding: the rows lose no digits of the fall, which they all share. Without the
-    smaller parts for weak rows it is off by 1e-5 of itself at 1e-7 kg m^2, by all of it at 1e-10."""
+    across them. To rounding: the rows lose no digits of the fall, which they all share. Without
+    smaller parts for weak rows it is off by 1e-5 of itself at 1e-7 kg m^2, by all at 1e-10."""
     scene = redundant.hinged_door()
     scene.bodies["door"].Jp = (4.0, moment, 4.0)
     (evaluator,) = machines_of(scene, "lsq")
