@@ -16,7 +16,7 @@ from support.trees import mixed_chain, random_tree
 import dap3d_core as dap
 
 #: Parts of the largest acceleration: what three passes of lsq may leave at ordinary numbers, what
-#: rounding does at ratios of masses and moments, and at most; how often what that of the state does.
+#: rounding does at ratios of masses and moments, at most; how often what rounding of a state does.
 ROUNDING, OF_RATIO, MOST, OF_STATE = 1e-9, 1e-14, 1e-7, 1e3
 #: Singular values, as parts of the largest, of rows that are independent, and that are not.
 INDEPENDENT, DEPENDENT = 1e-9, 1e-12
