@@ -15,16 +15,9 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.jumps.law import JumpLaw
 from dap3d_core.formulations.jumps.rounds import jump
 from dap3d_core.integrators import IMPLICIT, Integration
-from dap3d_core.integrators.adams.integration import AdamsIntegration
-from dap3d_core.integrators.adams.step import advance_adams
 from dap3d_core.integrators.moreau.impulses import put_means
 from dap3d_core.integrators.moreau.integration import MoreauIntegration
-from dap3d_core.integrators.moreau.step import advance as advance_contacts
 from dap3d_core.integrators.plugin_integrators import integrator_named
-from dap3d_core.integrators.radau.integration import RadauIntegration
-from dap3d_core.integrators.radau.step import advance as advance_radau
-from dap3d_core.integrators.runge_kutta.integration import RungeKutta
-from dap3d_core.integrators.runge_kutta.step import advance
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.compiler.types import FLOAT, INT, Array
 from dap3d_core.kernels.compiler.units import Entry, type_of
@@ -104,28 +97,16 @@ class Advance:
 
     @classmethod
     def of(cls, integration: Integration) -> "Advance":
-        """The loop of an integration.
-
-        Raises:
-            SceneError: its integrator cannot be exported.
-        """
-        function: Any = {
-            RungeKutta: advance, AdamsIntegration: advance_adams,
-            MoreauIntegration: advance_contacts,
-        }.get(type(integration))  # fmt: skip
+        """The loop of an integration."""
         completes = None
         if isinstance(integration, MoreauIntegration):
             integration.make_room()
             means: Any = put_means
             changed = integration.loop_arguments[:2]
             completes = means.compile([*map(type_of, changed), Array(FLOAT, 1)])
-        if isinstance(integration, RadauIntegration):
-            function = advance_radau
-        elif function is None:
-            raise refusal(f"integrator {integration.name} cannot be exported")
+        loop: Any = integration.loop
         given = integration.loop_arguments
-        entry = function.compile([*map(type_of, given), INT])
-        return cls(integration, entry, given, completes)
+        return cls(integration, loop.compile([*map(type_of, given), INT]), given, completes)
 
 
 @attrs.frozen(eq=False)
