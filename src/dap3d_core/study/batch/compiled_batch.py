@@ -17,8 +17,9 @@ from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.runge_kutta.step import advance
 from dap3d_core.integrators.stepping.integration import off_constraints
 from dap3d_core.integrators.stepping.integration_state import Status
+from dap3d_core.kernels.compiler.types import INT, Signature
 from dap3d_core.kernels.runtime.cache import jit_is_on, table_of
-from dap3d_core.kernels.runtime.function_lists import INTEGER, LOOP_LIST, procedure_signature
+from dap3d_core.kernels.runtime.function_lists import LOOP_LIST
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.scene import Simulation
@@ -42,7 +43,7 @@ MOST_STATES, FIRST_CALLS = 8, 50
 #: Constants of the metric in which displacements are measured in m (Model.length) and rad.
 UNIT_METRIC = np.array([1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0])
 
-_DRIVE = procedure_signature(RungeKuttaState.type_of(), STEPS, System.type_of(), LOOP_LIST, INTEGER)
+_DRIVE = Signature((RungeKuttaState.type_of(), STEPS, System.type_of(), LOOP_LIST, INT))
 
 MakeBatch = Callable[[], "CompiledBatch"]
 
