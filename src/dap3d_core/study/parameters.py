@@ -16,7 +16,7 @@ from dap3d_core.scene import Instance, Mistake, Scene, SceneError, Simulation, V
 from dap3d_core.scene.coerce import canonical
 from dap3d_core.scene.tables import LIMITS, NAMED, Element
 from dap3d_core.settings import SETTINGS
-from dap3d_core.study.design import design_of
+from dap3d_core.study.design import FORMS, design_of
 
 AXES = ("x", "y", "z")
 EULER_PARAMETERS = ("e0", "e1", "e2", "e3")
@@ -38,8 +38,6 @@ UNITS = {"mass": "kg", "Jp": "kg m^2", "r": "m", "r_0": "m", "r_dot": "m/s", "w"
 #: Largest number of names in a message.
 MAX_NAMES = 6
 FORM = "names are TABLE.NAME.FIELD, such as bodies.crank.mass, simulation.FIELD, parameters.NAME"
-
-FORMS = "1:5:9 (from:to:count), 1:100:5:log or 10,50,100 (a list)"
 
 
 @attrs.frozen
