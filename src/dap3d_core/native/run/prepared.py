@@ -2,7 +2,6 @@
 
 import os
 from functools import cached_property
-from itertools import pairwise
 from typing import Any, ClassVar
 
 import attrs
@@ -23,7 +22,6 @@ from dap3d_core.kernels.compiler.types import FLOAT, INT, Array
 from dap3d_core.kernels.compiler.units import Entry, type_of
 from dap3d_core.kernels.runtime.array_struct import Arrays
 from dap3d_core.kernels.runtime.cache import jit_is_on
-from dap3d_core.model.knots import breaks_of
 from dap3d_core.model.state_layout import y_from_u
 from dap3d_core.native.run.image import Image
 from dap3d_core.registry import Registry
@@ -32,7 +30,7 @@ from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.control.held_inputs import HeldInputs
 from dap3d_core.simulation.events.contact_jumps import ContactJumps
 from dap3d_core.simulation.events.uncarried_contact import UncarriedContact
-from dap3d_core.simulation.initial.breakpoints import SEEN
+from dap3d_core.simulation.initial.breakpoints import stops_of
 from dap3d_core.simulation.run_state import Callbacks, jumps_of
 from dap3d_core.simulation.settings import compiled_for, settings_of
 from dap3d_core.simulation.stepwise.stepped_run import HORIZON, OpenRun
@@ -331,14 +329,12 @@ class PreparedRun:
     @cached_property
     def stops(self) -> list[Stop]:
         """Break points of functions of time in runs of any length, and instants between them."""
-        checked, model = self.compiled.checked, self.evaluator.model
-        used = {int(k) for group in model.functions for k in group.members}
-        breaks = sorted({
-            float(t) for k in used for t in breaks_of(checked.functions[k]) if 0.0 < t < HORIZON
-        })  # fmt: skip
-        between = [Stop(a + part * (b - a), False, b) for a, b in pairwise(breaks) for part in SEEN]
-        found = [*(Stop(t, True, t) for t in breaks), *between]
-        return sorted(found, key=lambda stop: (stop.t, stop.jumps))
+        found: list[Stop] = []
+        needs = HORIZON
+        for t, jumps in reversed(stops_of(self.compiled.checked, self.evaluator.model, HORIZON)):
+            needs = t if jumps else needs
+            found.append(Stop(t, jumps, needs))
+        return found[::-1]
 
     @cached_property
     def drives(self) -> bool:
