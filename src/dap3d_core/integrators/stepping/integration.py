@@ -235,15 +235,12 @@ class Integration(Restorable):
         """
         if self.rows_are_full and self.status is Status.RUNNING:
             raise RuntimeError("the row buffer is full: take rows() before advancing")
-        self._call_compiled(budget)
-        return self.status
-
-    def _call_compiled(self, budget: int) -> None:
         if jit_is_on():
             self._advance(budget)
         else:
             with np.errstate(all="ignore"):  # as in compiled code, which tests what matters
                 self._advance(budget)
+        return self.status
 
     def project(self) -> bool:
         """Bring the state onto its constraints; False if that failed."""

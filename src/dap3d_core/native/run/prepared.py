@@ -34,8 +34,7 @@ from dap3d_core.simulation.initial.breakpoints import stops_of
 from dap3d_core.simulation.run_state import Callbacks, jumps_of
 from dap3d_core.simulation.settings import compiled_for, settings_of
 from dap3d_core.simulation.stepwise.stepped_run import HORIZON, OpenRun
-from dap3d_core.study.batch import initial_state
-from dap3d_core.study.batch.compiled_batch import UNIT_METRIC, begin_functions
+from dap3d_core.study.batch.compiled_batch import begin_functions, start_constants
 from dap3d_core.study.batch.driver import MIN_PIVOT
 from dap3d_core.study.batch.initial_state import begin_free
 
@@ -213,14 +212,8 @@ class StartCode:
             return None
         if str(settings.correct_metric) != "unit":
             return None
-        unit = UNIT_METRIC.copy()
-        unit[0] = model.length
-        starting = np.zeros(initial_state.STARTING + evaluator.plan.row_size)
-        starting[initial_state.SIZE] = evaluator.model.size
-        without = evaluator.system.row[np.flatnonzero(~model.position_row)]
-        starting[initial_state.STARTING + without] = 1.0
         given = np.concatenate([model.u0, model.initial_states])
-        arrays = StartArrays(given=given, unit=unit, starting=starting)
+        arrays = StartArrays(given=given, **start_constants(evaluator))
         is_corrected = bool(model.joint_row_count and settings.correct)
         assembles = is_corrected and not (formulation.accepts_redundant or has_contacts)
         # pivots beside contacts are not watched (formulations/pivots.py)
