@@ -11,6 +11,7 @@ from dap3d_core.linear.rank.rank import DENSE_ROWS
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import euler_rates
 from dap3d_core.model.state_layout import split
+from dap3d_core.registry.suggestions import some
 from dap3d_core.simulation.initial.least_change import finite_rows
 from dap3d_core.simulation.redundancy.redundancy import rank_of
 
@@ -18,8 +19,8 @@ from dap3d_core.simulation.redundancy.redundancy import rank_of
 NAMED = 1e-6
 #: Coordinates of joints are named that change by more than this part of those of bodies.
 PREFERRED = 1e-3
-#: Bodies and motions that a message gives.
-MOST_BODIES, MOST_MOTIONS = 6, 6
+#: Motions that a message gives.
+MOST_MOTIONS = 6
 
 
 def free_motions(evaluator: Evaluator, u: Floats) -> Floats:
@@ -85,10 +86,7 @@ def motion_words(model: Model, motion: Floats) -> str:
         if parts:
             words.append((max(shift, turn), f"{name} {' and '.join(parts)}"))
     words.sort(key=lambda pair: -pair[0])
-    more = len(words) - MOST_BODIES
-    return "; ".join(text for _, text in words[:MOST_BODIES]) + (
-        f"; and {more} bodies more" if more > 0 else ""
-    )
+    return some([text for _, text in words], between="; ")
 
 
 def freedoms_left(evaluator: Evaluator, u: Floats, dof: int) -> str:
