@@ -181,7 +181,7 @@ def over_values(over: str) -> Iterator[tuple[str, str]]:
         Refused: it is not PARAMETER=FROM:TO:N.
     """
     from dap3d_core.scene import SceneError
-    from dap3d_core.study.parameters import FORMS
+    from dap3d_core.study.design import FORMS
 
     name, sign, values = (part.strip() for part in over.rpartition("="))
     if not (name and sign and values):
