@@ -28,7 +28,7 @@ print(json.dumps([[len(few), differences(few, {few}, translated)],
                   [len(calls), {all} and differences(calls, {all}, translated)],
                   recorder.missing()]))
 """
-QUICK = [("pen1", {"t_end": 0.002, "dt": 0.001})]
+QUICK = [("bodies2", {"t_end": 0.002, "dt": 0.001})]
 RUNS = [*QUICK, *short_runs(0.001)]
 #: Friction, singular poses, points, dense supernodes, radau with states of elements: each of these
 #: calls a function that no other one calls.
