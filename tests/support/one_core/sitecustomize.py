@@ -1,5 +1,5 @@
-"""Child processes of tests see one core: none leaves a process behind that optimises its code, which
-takes longer than all that the child does (``kernels.compiler.background``)."""
+"""Child processes of tests see one core: none leaves a process behind that optimises its code,
+which takes longer than all that the child does (``kernels.compiler.background``)."""
 
 import os
 
