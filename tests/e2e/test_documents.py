@@ -36,7 +36,7 @@ FOLLOWED = [
 #: Of what pages do many times less here: poses, speeds, instants. Speeds enclose what is asserted.
 SHORTER = {
     "how-to/what-a-type-can-say.md": [("examine(type_))\n", "examine(type_), poses=1)\n")],
-    "how-to/equilibrium-paths.md": [("60:-60:13", "60:-60:4"), ("0:120:13", "0:120:3")],
+    "how-to/equilibrium-paths.md": [("60:-60:13", "60:-60:4")],
     "tutorials/modes-and-stability.md": [
         ("np.linspace(0.05, 10.0, 200)", "np.array([0.05, 4.28, 4.3, 5.0, 6.02, 6.03, 10.0])"),
         ("2.0 * critical, 80)", "2.0 * critical, 6)"),
