@@ -106,7 +106,8 @@ def gathered() -> tuple[dict[str, Any], dict[str, Any]]:
     units.collected = {}
     registry = dap.load_registry()
     is_tried = os.environ.get(LEVEL) == "0"
-    for kind in () if is_tried else GROUPS:
+    kinds = [] if is_tried else list(GROUPS)
+    for kind in kinds:
         for keyword in PROJECT["entry-points"][f"dap3d.{kind}s"]:
             compile_all(registry.get(kind, keyword))
     for folder in (path for path in MODELS if path.name in TRIED or not is_tried):

@@ -36,7 +36,11 @@ FOLLOWED = [
 #: Of what pages do many times less: poses, speeds, frames. Speeds enclose what is asserted.
 SHORTER = {
     "how-to/what-a-type-can-say.md": [("examine(type_))\n", "examine(type_), poses=1)\n")],
-    "how-to/equilibrium-paths.md": [("60:-60:13", "60:-60:4")],
+    "how-to/equilibrium-paths.md": [
+        ("f.z=60:-60:13", "f.z=60:30:2"),
+        ("60:-60:13", "60:-60:4"),
+        ('0:120:13")\nassert np', '0:120:3")\nassert np'),
+    ],
     "how-to/plots-and-animations.md": [("--speed 0.2", "--speed 2")],
     "how-to/report.md": [("report fourbar3 --quick", "report fourbar3 --quick --t-end 0.5")],
     "tutorials/modes-and-stability.md": [
@@ -44,7 +48,7 @@ SHORTER = {
         ("2.0 * critical, 80)", "2.0 * critical, 6)"),
         ("-4:120:63", "-4:120:5"),
     ],
-    "tutorials/inverse-dynamics.md": [("0.0, 2.0, 401)", "0.0, 2.0, 161)")],
+    "tutorials/inverse-dynamics.md": [("0.0, 2.0, 401)", "0.0, 2.0, 121)")],
 }
 
 
