@@ -87,11 +87,7 @@ def _in_order(mistakes: list[Mistake]) -> list[Mistake]:
 
 
 def _check(scene: Scene, fields: Fields, registry: Registry) -> None:
-    """Check the scene but for the user's forces, which have no type yet.
-
-    Raises:
-        SceneError: the mistakes, at the lines of the MATLAB files.
-    """
+    """Check the scene but for the user's forces, which have no type yet."""
     forces = {n: f for n, f in scene.forces.items() if f.type != KEYWORD}
     try:
         checked = check(attrs.evolve(scene, forces=forces), registry)

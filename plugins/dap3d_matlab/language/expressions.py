@@ -74,11 +74,7 @@ _OUTSIDE = {
 
 
 def _call(name: str, values: list[Numbers], node: "Node") -> Numbers:
-    """The value of one of ``_FUNCTIONS``.
-
-    Raises:
-        RefusalError: the arguments do not fit, or the value is not finite and real.
-    """
+    """The value of one of ``_FUNCTIONS``."""
     if name in _FILLED:
         return _filled(name, values, node)
     count = 2 if name == "atan2" else 1

@@ -97,11 +97,7 @@ def extension_listing(limit_s: float | None = LOAD_LIMIT) -> list[PluginInfo]:
 
 
 def _load(source: Source, limit_s: float | None = None) -> Any:
-    """What an entry point names, loaded within a time limit, s.
-
-    Raises:
-        PluginError: names distribution, module, reason and remedy.
-    """
+    """What an entry point names, loaded within a time limit, s."""
     hook = EXTENSIONS[source.kind][1]
     module_name, base_name = _BASES[source.kind]
     specs = importlib.import_module(module_name)

@@ -159,11 +159,7 @@ class SourceFiles:
             raise FormatError(f"{path.name} is no PNG image: {error}", place) from None
 
     def _inside(self, uri: str, place: Place, base: Path, *, missing: bool = False) -> Path:
-        """A path within the folder or a package; with ``missing`` also one that is nowhere.
-
-        Raises:
-            FormatError: it lies elsewhere, or its package is not known.
-        """
+        """A path within the folder or a package; with ``missing`` also one that is nowhere."""
         root, name = self.folder, uri.strip()
         scheme, separator, rest = name.partition("://")
         if separator and scheme in ("package", "model"):
@@ -189,9 +185,6 @@ class SourceFiles:
 
     def _package(self, package: str, uri: str, place: Place) -> Path:
         """The folder of a package: given, or of its name above the file or next to such a folder.
-
-        Raises:
-            FormatError: it is not known.
         """
         if package in self.packages:
             return self.packages[package]

@@ -178,11 +178,7 @@ class _Start:
         return known
 
     def _refuse(self, leader: str, joint: str, what: str, wanted: float, found: float) -> None:
-        """Refuse a start that contradicts a coupling.
-
-        Raises:
-            FormatError: always.
-        """
+        """Refuse a start that contradicts a coupling."""
         zero = self.model.joints[joint].reference if what == "position" else 0.0
         text = f"{what} of {joint} = {found + zero:g}: it is coupled with {leader}, which puts it "
         place = self.model.joints[joint].place

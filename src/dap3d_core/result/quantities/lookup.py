@@ -412,9 +412,6 @@ def _contact_quantity(source: QuantitySource, name: str) -> Quantity | None:
 
     Vectors by components or ``norm``; those of a contact with several points are of ``NAME#1``;
     scalars of such a contact have a column for each point.
-
-    Raises:
-        UnknownNameError: the contact has no such quantity.
     """
     head, *rest = name.split(".")
     points = source.summary.contacts.get(head.partition(POINT)[0])
