@@ -184,8 +184,7 @@ class SourceFiles:
         raise FormatError(f"{uri!r} lies outside of the folder of the model", place, remedy)
 
     def _package(self, package: str, uri: str, place: Place) -> Path:
-        """The folder of a package: given, or of its name above the file or next to such a folder.
-        """
+        """The folder of a package: given, or of its name above the file or beside such a folder."""
         if package in self.packages:
             return self.packages[package]
         root = self.folder.resolve()
