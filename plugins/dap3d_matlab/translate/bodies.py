@@ -67,7 +67,7 @@ def _orientation(fields: Fields, struct: Struct) -> Any:
     if rows is None:
         return None
     A = np.array(rows)
-    p_of_A = parameters_of(A)
+    p_of_A = tuple(parameters_of(A).tolist())
     if np.abs(from_quaternion(p_of_A) - A).max() > ROTATION_TOLERANCE:
         what = f"should be a rotation matrix (A^T A = I, det A = 1, within {ROTATION_TOLERANCE:g})"
         fields.refuse(struct, "A", what)
@@ -75,7 +75,7 @@ def _orientation(fields: Fields, struct: Struct) -> Any:
     if "p" not in struct.given:
         words = "gives the orientation: p is worked out from it (the MATLAB program reads p alone)"
         fields.changed(struct, "A", words)
-        return tuple(p_of_A.tolist())
+        return p_of_A
     if not 0.0 < np.dot(p, p) < np.inf or np.abs(from_quaternion(p) - A).max() > 1e-3:
         fields.refuse(struct, "A", "is another orientation than p", "give one of them")
         return None
@@ -188,8 +188,7 @@ def add_animation(scene: Scene, fields: Fields) -> None:
         place = next(iter(limits.values()))[1]
         fields.report.unused.append(remark(place, text))
     elif given and None not in given:
-        pairs = zip(given[::2], given[1::2], strict=True)
-        scene.animation.limits = tuple(pairs)
+        scene.animation.limits = tuple(zip(given[::2], given[1::2], strict=True))
         fields.places["animation.limits"] = limits["xmin"][1]
 
 
