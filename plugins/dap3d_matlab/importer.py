@@ -92,8 +92,7 @@ def _check(scene: Scene, fields: Fields, registry: Registry) -> None:
     try:
         checked = check(attrs.evolve(scene, forces=forces), registry)
     except SceneError as error:
-        mistakes = [_relocated(m, fields) for m in error.mistakes]
-        raise SceneError(_in_order(mistakes)) from None
+        raise SceneError(_in_order([_relocated(m, fields) for m in error.mistakes])) from None
     has_own = len(forces) < len(scene.forces)
     fields.report.notes += [n for n in checked.notes if not (has_own and _LEFT_ALONE in n)]
 

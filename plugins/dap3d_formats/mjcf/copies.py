@@ -152,8 +152,7 @@ class _Copier:
 
     def _copy_naming(self, names: set[tuple[str, str]], suffixes: list[str]) -> None:
         """Copy elements outside of bodies that name one of those that are copied."""
-        root = self.document.root
-        for section in (one for tag in NAMING for one in root.all(tag)):
+        for section in (one for tag in NAMING for one in self.document.root.all(tag)):
             children: list[XmlElement] = []
             for child in section:
                 if names.isdisjoint(_references(child)):

@@ -178,8 +178,7 @@ class Geoms:
         if kind in FLAT or mass == 0.0 or (mass < 0.0 and density == 0.0):
             return None
         if geom.get("shellinertia") == "true":
-            what = "a geom with shellinertia: give the body an <inertial>"
-            raise FormatError(what, geom.place)
+            raise FormatError("a geom with shellinertia: give the body an <inertial>", geom.place)
         if kind == "mesh":
             volume, com, unit_inertia = self._mesh_inertia(geom)
             pose = frame @ self.document.frame(geom)

@@ -40,8 +40,7 @@ def read_joint(reader: SdfReader, element: XmlElement, scope: str) -> None:
         raise FormatError(f"joint {name}: type {type_!r} is unknown; one of {', '.join(KINDS)}",
                           element.place)  # fmt: skip
     parent, child = _end(reader, element, scope, "parent"), _end(reader, element, scope, "child")
-    frames = reader.frames
-    here = frames.in_world(name, element.place)
+    here = reader.frames.in_world(name, element.place)
     joint = Joint(
         name, KINDS[type_], parent, child,
         _of_link(reader, parent, element.place).inverse() @ here,

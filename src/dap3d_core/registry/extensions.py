@@ -105,8 +105,7 @@ def _load(source: Source, limit_s: float | None = None) -> Any:
     with guard(source, []), within(limit_s):
         if source.fault:
             raise PluginError(source.fault)
-        module = importlib.import_module(source.module)
-        results = getattr(hooks_of(module, specs), hook)()
+        results = getattr(hooks_of(importlib.import_module(source.module), specs), hook)()
         brought = [one for result in results for one in result or ()]
         if not all(_is_a(one, base) for one in brought):
             raise PluginError(f"{hook}() should return a list of {base_name}")

@@ -283,8 +283,7 @@ def _limits(builder: SceneBuilder, tendon: Tendon) -> bool:
         return False
     if builder.limits != "off":
         return True
-    text = "limits of tendons, with limits = off"
-    builder.remarks.leave_out(tendon.place, text, motion=True)
+    builder.remarks.leave_out(tendon.place, "limits of tendons, with limits = off", motion=True)
     return False
 
 

@@ -46,8 +46,7 @@ class JointEnds:
         self.builder, self.joint, self.scene = builder, joint, builder.scene
         self.child, self.on_child = builder.attached(joint.child, joint.in_child)
         self.parent, self.on_parent = builder.attached(joint.parent, joint.in_parent)
-        names = builder.names
-        self.name = name or names.of("joints", joint.name, joint.place, builder.remarks)
+        self.name = name or builder.names.of("joints", joint.name, joint.place, builder.remarks)
 
     def point(self, end: str, offset: Any = (0.0, 0.0, 0.0), suffix: str = "") -> str:
         """The name of a point at the joint's origin on the child ("i") or the parent ("j").

@@ -184,8 +184,7 @@ def _is_base_fixed(model: Articulation, remarks: Remarks, *, free_base: bool) ->
         return model.fixed_base
     moves = any(joint.kind != "fixed" for joint in model.joints.values())
     if not moves and not free_base:
-        text = "no joint of the model moves: its base is free"
-        remarks.translate(model.place, text, motion=True)
+        remarks.translate(model.place, "no joint of the model moves: its base is free", motion=True)
     return moves and not free_base
 
 
@@ -388,8 +387,7 @@ class _JointCoordinate:
         if builder.limits != "hard" or not builder.takes_contacts or joint.kind not in SCALAR:
             return False
         q = joint.position[0] if joint.position else 0.0
-        inside = limits.contain(q, AGREE * max(1.0, abs(q)))
-        if joint in builder.inertia.loops or not inside:
+        if joint in builder.inertia.loops or not limits.contain(q, AGREE * max(1.0, abs(q))):
             return False
         fields = builder.scene.joints[self.name].fields
         if isfinite(limits.lower):

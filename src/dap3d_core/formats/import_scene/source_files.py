@@ -202,8 +202,7 @@ class SourceFiles:
         try:
             data = read_regular(path, LARGEST + 1)
         except OSError as error:
-            what = f"{path} cannot be read: {error.strerror or error}"
-            raise FormatError(what, place) from None
+            raise FormatError(f"{path} cannot be read: {error.strerror or error}", place) from None
         if len(data) > LARGEST:
             raise FormatError(f"{path.name} has more than {LARGEST >> 20} MiB", place)
         return data
