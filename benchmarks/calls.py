@@ -7,9 +7,9 @@ import statistics
 import time
 
 import scenes
+from peers.prepared_run import PreparedRun
 
 from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
-from dap3d_core.integrators.prepared import PreparedRun
 from dap3d_core.simulation import CompiledModel
 
 CALLS, REPEATS = 1000, 15

@@ -4,7 +4,8 @@
 source tree that contains it, installed or not; it needs attrs, llvmlite, numpy, pluggy and scipy.
 The loops are those of all standard types; the core's units are those that runs of the shipped
 models make, with each method and integrator, and that their exports link. Where DAP3D_READY_LEVEL
-is 0, for tests, code is unoptimised, of three models and exports of one: some minutes less.
+is 0, for tests, code is unoptimised, of runs of three models and exports of one alone: some minutes
+less.
 """
 
 import concurrent.futures
@@ -104,10 +105,11 @@ def gathered() -> tuple[dict[str, Any], dict[str, Any]]:
         os.sched_setaffinity(0, set(list(os.sched_getaffinity(0))[:1]))  # nothing is made beside
     units.collected = {}
     registry = dap.load_registry()
-    for kind in GROUPS:
+    is_tried = os.environ.get(LEVEL) == "0"
+    kinds = [] if is_tried else list(GROUPS)
+    for kind in kinds:
         for keyword in PROJECT["entry-points"][f"dap3d.{kind}s"]:
             compile_all(registry.get(kind, keyword))
-    is_tried = os.environ.get(LEVEL) == "0"
     for folder in (path for path in MODELS if path.name in TRIED or not is_tried):
         scene = dap.load(folder)
         for integrator in INTEGRATORS:

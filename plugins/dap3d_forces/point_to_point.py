@@ -41,9 +41,8 @@ class PointToPoint(Force):
     function: str = function(argument="l - l0", doc="force, N, in place of k (l - l0)")
 
     def wrench(d, d_dot, s_P_i, s_P_j, k, c, l0, f_a):
-        length, u, at_zero = line(d, l0 * l0 + f_a * f_a)
-        T = k * (length - l0) + c * dot(u, d_dot) + f_a
-        return pull_damped(T, u, scale(at_zero * c, d_dot), s_P_i, s_P_j)
+        bound = l0 * l0 + f_a * f_a
+        return spring_pull(d, d_dot, s_P_i, s_P_j, k, c, l0, f_a, bound)
 
     def energy(d, k, l0, f_a):
         length = sqrt(dot(d, d))
@@ -56,9 +55,8 @@ class OfTime(PointToPoint, function=False, factor=True):
     energy_where = "without f_a"
 
     def wrench(d, d_dot, s_P_i, s_P_j, k, c, l0, f_a, factor):
-        length, u, at_zero = line(d, l0 * l0 + f_a * f_a)
-        T = k * (length - l0) + c * dot(u, d_dot) + factor * f_a
-        return pull_damped(T, u, scale(at_zero * c, d_dot), s_P_i, s_P_j)
+        bound = l0 * l0 + f_a * f_a
+        return spring_pull(d, d_dot, s_P_i, s_P_j, k, c, l0, factor * f_a, bound)
 
     def energy(d, k, l0):
         return spring_energy(d, k, l0)
@@ -70,9 +68,8 @@ class Actuated(PointToPoint, function=False, input=True):
     energy_where = "without f_a"
 
     def wrench(d, d_dot, s_P_i, s_P_j, k, c, l0, f_a, input):
-        length, u, at_zero = line(d, l0 * l0 + f_a * f_a)
-        T = k * (length - l0) + c * dot(u, d_dot) + input * f_a
-        return pull_damped(T, u, scale(at_zero * c, d_dot), s_P_i, s_P_j)
+        bound = l0 * l0 + f_a * f_a
+        return spring_pull(d, d_dot, s_P_i, s_P_j, k, c, l0, input * f_a, bound)
 
     def energy(d, k, l0):
         return spring_energy(d, k, l0)
@@ -84,9 +81,7 @@ class Curve(PointToPoint, function=True, factor=False, input=False):
     energy = None
 
     def wrench(d, d_dot, s_P_i, s_P_j, c, l0, f_a, f):
-        length = sqrt(dot(d, d))
-        u = scale(1.0 / length, d)
-        return pull(f(length - l0) + c * dot(u, d_dot) + f_a, u, s_P_i, s_P_j)
+        return curve_pull(d, d_dot, s_P_i, s_P_j, c, l0, f, f_a)
 
 
 class CurveOfTime(PointToPoint, function=True, factor=True):
@@ -95,9 +90,7 @@ class CurveOfTime(PointToPoint, function=True, factor=True):
     energy = None
 
     def wrench(d, d_dot, s_P_i, s_P_j, c, l0, f_a, f, factor):
-        length = sqrt(dot(d, d))
-        u = scale(1.0 / length, d)
-        return pull(f(length - l0) + c * dot(u, d_dot) + factor * f_a, u, s_P_i, s_P_j)
+        return curve_pull(d, d_dot, s_P_i, s_P_j, c, l0, f, factor * f_a)
 
 
 class ActuatedCurve(PointToPoint, function=True, input=True):
@@ -106,9 +99,7 @@ class ActuatedCurve(PointToPoint, function=True, input=True):
     energy = None
 
     def wrench(d, d_dot, s_P_i, s_P_j, c, l0, f_a, f, input):
-        length = sqrt(dot(d, d))
-        u = scale(1.0 / length, d)
-        return pull(f(length - l0) + c * dot(u, d_dot) + input * f_a, u, s_P_i, s_P_j)
+        return curve_pull(d, d_dot, s_P_i, s_P_j, c, l0, f, input * f_a)
 
 
 def spring_energy(d, k, l0):
@@ -135,9 +126,18 @@ def pull(T, u, s_i, s_j):
     return at_ends(scale(T, u), s_i, s_j)
 
 
-def pull_damped(T, u, F, s_i, s_j):
-    """The same, and a force F."""
-    return at_ends(add(scale(T, u), F), s_i, s_j)
+def spring_pull(d, d_dot, s_i, s_j, k, c, l0, F, bound):
+    """The pull of a spring, a damper and an actuator's force F; bound: as of ``line``."""
+    length, u, at_zero = line(d, bound)
+    T = k * (length - l0) + c * dot(u, d_dot) + F
+    return at_ends(add(scale(T, u), scale(at_zero * c, d_dot)), s_i, s_j)
+
+
+def curve_pull(d, d_dot, s_i, s_j, c, l0, f, F):
+    """The pull of a spring curve f, a damper and an actuator's force F."""
+    length = sqrt(dot(d, d))
+    u = scale(1.0 / length, d)
+    return pull(f(length - l0) + c * dot(u, d_dot) + F, u, s_i, s_j)
 
 
 def at_ends(F, s_i, s_j):

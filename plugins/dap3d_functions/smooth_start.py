@@ -2,6 +2,7 @@
 
 from dap3d_core.interface import Function, hookimpl, number
 from dap3d_core.kernels import where
+from dap3d_functions.step import Step
 
 interface_version = 1
 
@@ -21,13 +22,7 @@ class SmoothStart(Function):
     f_start: float = number(default=0.0, doc="value before")
     fp_end: float = number(default=0.0, doc="slope after")
 
-    def prepare(self, bodies):
-        if not self.x_end > self.x_start:
-            raise ValueError(f"x_end = {self.x_end:g} must lie beyond x_start = {self.x_start:g}")
-        return {}
-
-    def breaks(self):
-        return self.x_start, self.x_end
+    prepare, breaks = Step.prepare, Step.breaks
 
     def value(x, x_start, x_end, f_start, fp_end):
         D = x_end - x_start

@@ -87,17 +87,12 @@ def _in_order(mistakes: list[Mistake]) -> list[Mistake]:
 
 
 def _check(scene: Scene, fields: Fields, registry: Registry) -> None:
-    """Check the scene but for the user's forces, which have no type yet.
-
-    Raises:
-        SceneError: the mistakes, at the lines of the MATLAB files.
-    """
+    """Check the scene but for the user's forces, which have no type yet."""
     forces = {n: f for n, f in scene.forces.items() if f.type != KEYWORD}
     try:
         checked = check(attrs.evolve(scene, forces=forces), registry)
     except SceneError as error:
-        mistakes = [_relocated(m, fields) for m in error.mistakes]
-        raise SceneError(_in_order(mistakes)) from None
+        raise SceneError(_in_order([_relocated(m, fields) for m in error.mistakes])) from None
     has_own = len(forces) < len(scene.forces)
     fields.report.notes += [n for n in checked.notes if not (has_own and _LEFT_ALONE in n)]
 

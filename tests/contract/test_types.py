@@ -26,8 +26,8 @@ JOINTS = cases(REGISTRY, "joint")
 @pytest.mark.parametrize("others", [False, pytest.param(True, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("key", OWN, ids="-".join)
 def test_type(key, others):
-    """A fifth of the checks of a type and its variants, and the others."""
-    chosen = (check for k, check in enumerate(CHECKS[key]) if bool(k % 5) is others)
+    """A ninth of the checks of a type and its variants, and the others."""
+    chosen = (check for k, check in enumerate(CHECKS[key]) if bool(k % 9) is others)
     assert not [str(outcome) for check in chosen if not (outcome := check.run()).ok]
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from support.falling import SCENE
-from support.process import UNOPTIMISED
+from support.process import ONE_CORE, UNOPTIMISED
 
 import dap3d_core as dap
 
@@ -28,7 +28,8 @@ def environment(**variables):
         "DAP3D_BLOCK",
     )
     kept = {k: v for k, v in os.environ.items() if not k.startswith(dropped)}
-    return kept | {"DAP3D_CACHE_DIR": str(UNOPTIMISED)} | {k: str(v) for k, v in variables.items()}
+    own = {"DAP3D_CACHE_DIR": str(UNOPTIMISED), "PYTHONPATH": str(ONE_CORE)}
+    return kept | own | {k: str(v) for k, v in variables.items()}
 
 
 class CommandLine:

@@ -424,9 +424,6 @@ def test_a_client_that_is_closed_meanwhile(client):
 
 
 def test_what_is_no_client_is_refused(client):
-    for chunk in (0, -1, 2.5, True):
-        with pytest.raises(dap.SceneError, match=r"chunk = .*a whole number of points from 1"):
-            dask_cluster.run_on(client, bob(), POINTS, PLACES, chunk=chunk)
     with pytest.raises(dap.SceneError, match=r"client = .*a distributed\.Client"):
         dask_cluster.run_on("tcp://127.0.0.1:8786", bob(), POINTS, PLACES)
 

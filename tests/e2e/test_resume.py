@@ -102,7 +102,7 @@ print(found)
 def test_killed_at_any_moment_a_run_leaves_what_it_had(tmp_path):
     """Rows and checkpoint are whole each time, and the run goes on to the same bits."""
     done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", KILLED, "8"],
+        [sys.executable, "-W", "ignore", "-c", KILLED, "4"],
         cwd=tmp_path,
         env=environment(),
         capture_output=True,
@@ -110,8 +110,8 @@ def test_killed_at_any_moment_a_run_leaves_what_it_had(tmp_path):
     )
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout.replace("'", '"'))
-    assert found["killed"] == 8
-    assert found["resumed"] >= 3
+    assert found["killed"] == 4
+    assert found["resumed"] >= 1
 
 
 @pytest.mark.slow

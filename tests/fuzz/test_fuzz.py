@@ -29,6 +29,11 @@ COUNTS = {
 }
 
 
+def long(*values):
+    """A case that takes ten seconds and more."""
+    return pytest.param(*values, marks=[pytest.mark.slow, pytest.mark.long])
+
+
 def test_every_target_is_tried():
     assert COUNTS.keys() == TARGETS.keys()
 
@@ -52,7 +57,7 @@ def test_more_inputs(name):
                                     1_650_876, 14_923_612, 10_445_297, 11_594_543, 18_897_519,
                                     8_897_954, 13_400_462, 21_657_220, 25_366_246, 8_355_428,
                                     25_901_617, 28_577_788, 13_822_892,
-                                    26_078_414, 27_019_585, 25_987_196, 21_456_175,
+                                    26_078_414, 27_019_585, long(25_987_196), 21_456_175,
                                     8_003_505, 17_694_781, 3_738_232,
                                     6_188_153, 4_609_733, 27_250_592, 9_754_102,
                                     4_607_735, 25_774_717, 3_059_079, 342_429,
@@ -77,14 +82,14 @@ def test_accelerations_that_once_were_wrong(number):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("number", "ending"), [(19_565_458, "done"), (16_291_320, "refused")])
+@pytest.mark.parametrize(("number", "ending"), [long(19_565_458, "done"), (16_291_320, "refused")])
 def test_derivatives_that_once_were_wrong(number, ending):
     """A ball that slides over the edge of a box, and a capsule that slides from rest."""
     assert check_gradients(str(number).encode()) == ending
 
 
 @pytest.mark.every(4)
-@pytest.mark.parametrize("number", [1_925_281, 1_000_006, 1_066_419, 1_635_495, 18_895_309,
+@pytest.mark.parametrize("number", [1_925_281, 1_000_006, 1_066_419, long(1_635_495), 18_895_309,
                                     17_600_526])  # fmt: skip
 def test_contacts_that_jam_are_named(number):
     """Again and again behind impulses that set them free, or with no forces where they begin.

@@ -12,7 +12,7 @@ from support.rotations import rotation
 import dap3d_core as dap
 from dap3d_core.interface import PluginError
 from dap3d_matlab.importer import translate
-from dap3d_matlab.translate.bodies import parameters_of, rotation_of
+from dap3d_matlab.translate.bodies import parameters_of
 
 
 @pytest.fixture
@@ -82,13 +82,12 @@ def test_a_rotation_matrix_in_place_of_euler_parameters(read):
     assert any("B1.A gives the orientation" in t for t in told(report.changed))
 
 
-def test_rotation_matrices_and_euler_parameters_fit_each_other():
-    """Random ones and half turns, against the rotation matrix of the model."""
+def test_euler_parameters_of_rotation_matrices():
+    """Random ones and half turns."""
     rng = np.random.default_rng(3)
     samples = [*rng.normal(size=(200, 4)), *np.eye(4)]
     for p in samples:
         p = p / np.linalg.norm(p)
-        np.testing.assert_allclose(rotation_of(p), rotation(p), atol=1e-15)
         found = parameters_of(rotation(p))
         np.testing.assert_allclose(np.abs(found @ p), 1.0, atol=1e-14)
 

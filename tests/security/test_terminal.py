@@ -65,7 +65,7 @@ def test_every_command_prints_plain_text(say, tmp_path):
 
 @pytest.mark.slow
 def test_a_film_has_no_controls_in_its_title(say, tmp_path):
-    assert say("animate", "run.nc", "-o", str(tmp_path / "a.gif"))[0] == 0
+    assert say("animate", "run.nc", "-o", str(tmp_path / "a.gif"), "--fps", "1")[0] == 0
 
 
 def test_mistakes_of_a_scene_are_plain_text(say, tmp_path):

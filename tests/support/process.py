@@ -8,12 +8,17 @@ from pathlib import Path
 REPOSITORY = Path(__file__).parents[2]
 #: Where tests keep code (tests/conftest.py).
 UNOPTIMISED = REPOSITORY / "build" / "unoptimised"
+#: Where ``sitecustomize`` keeps child processes from optimising code beside.
+ONE_CORE = REPOSITORY / "tests" / "support" / "one_core"
 
 
 def environment(cache=UNOPTIMISED, **variables):
-    """The environment of a child process, with a cache of compiled code, for the same processor."""
+    """The environment of a child process, with a cache of compiled code, for the same processor.
+    With that of the tests its code stays unoptimised, as theirs does."""
     ours = ("DAP3D_", "COVERAGE_")
     env = {k: v for k, v in os.environ.items() if not k.startswith(ours) or k == "DAP3D_CPU"}
+    if cache == UNOPTIMISED and "DAP3D_PLAIN" not in variables:
+        env["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ONE_CORE), env.get("PYTHONPATH")]))
     return env | {"DAP3D_CACHE_DIR": str(cache)} | {k: str(v) for k, v in variables.items()}
 
 

@@ -246,6 +246,72 @@ def test_a_hinged_rod_that_lifts_off_by_radau():
     assert one == pytest.approx(other, rel=TOLERANCE)
 
 
+def block(tilt, mu, across, height=0.0):
+    """A point mass that goes at 3 m/s down a slope (up, where tilt is negative), m above it."""
+    scene, along = dap.Scene(name="block"), 3.0 * np.array([-np.cos(tilt), 0.0, -np.sin(tilt)])
+    along[1], up = across, np.array([-np.sin(tilt), 0.0, np.cos(tilt)])
+    scene.add_body("block", mass=2.0, Jp=[0.01] * 3, r=height * up, r_dot=along)
+    scene.add_force("weight", "g", gravity=G)
+    scene.add_vector("up", "ground", up)
+    scene.add_contact("ball_plane", "slope", P_i="block.O", a_j="up", mu=mu)
+    return scene
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tilt", [0.3, -0.3])
+@pytest.mark.parametrize(
+    ("settings", "tolerance"),
+    [
+        ({}, 1e-9),
+        ({"method": "joint"}, 1e-9),
+        ({"integrator": "radau"}, 1e-8),
+        # dense output and first steps of low order, which suit the motion alone
+        ({"integrator": "dopri5"}, 1e-5),
+        ({"integrator": "adams"}, 3e-5),
+    ],
+)
+def test_a_block_that_stops_on_a_slope_by_its_speed_across(tilt, settings, tolerance):
+    """With mu N / m = k a, of the deceleration a, speed across falls as (1 - t / t_1)^k.
+
+    The motion itself is straight and uniformly decelerated: any step is exact, so that one reaches
+    the end, where the direction of slip changes at a rate of k / (t_1 - t).
+    """
+    mu, v = 0.5, 3.0
+    across = mu * G * np.cos(tilt)
+    a = across - G * np.sin(tilt)
+    k, t_1 = across / a, v / a
+    by = ["bodies.block.r_dot.y", "contacts.slope.mu"]
+    found = dap.sensitivities(block(tilt, mu, 0.0), by, t_end=3.0, dt=0.25, **settings)
+    left = 1.0 - np.minimum(found.result.t, t_1) / t_1
+    slopes = [found.derivative(lambda result, i=i: result.r[i, 0, 1])[0] for i in range(len(left))]
+    assert slopes == pytest.approx(t_1 / (k + 1.0) * (1.0 - left ** (k + 1.0)), abs=tolerance)
+    assert slopes[-1] == pytest.approx(t_1 / (k + 1.0), rel=1e-6)
+    kinds = [event.kind for event in found.result.events]
+    stop = found.event_times[kinds.index("stick")]
+    assert stop == pytest.approx([0.0, -v * G * np.cos(tilt) / a**2], abs=1e-7)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("tilt", "height"), [(0.3, 0.0), (-0.3, 0.0), (0.3, 0.01)])
+@pytest.mark.parametrize("integrator", ["dop853", "radau"])
+def test_slip_that_turns_as_it_ends(tilt, height, integrator):
+    """Off by up to a tenth where derivatives were those of the steps of the motion.
+
+    Where it falls first, it slides from an instant on that parameters move.
+    """
+    by, across, mu = ["bodies.block.r_dot.y", "contacts.slope.mu"], 1.0, 0.5
+    scene = block(tilt, mu, across, height)
+    found = dap.sensitivities(scene, by, t_end=3.0, integrator=integrator)
+    settings = {"t_end": 3.0, "dt": 3.0, "rtol": 1e-12, "atol": 1e-14}
+
+    def last(across, mu):
+        return dap.simulate(block(tilt, mu, across, height), **settings).r[-1, 0]
+
+    for k, of in enumerate((lambda x: last(x, mu), lambda x: last(across, x))):
+        exact = derivative(of, (across, mu)[k], 1e-3)
+        assert found.final("block.r")[:, k] == pytest.approx(exact, rel=1e-6, abs=1e-7)
+
+
 @pytest.mark.slow
 def test_slip_from_rest_has_no_derivative():
     """A block that begins to slide goes where the least slip does; by its mass there is one."""

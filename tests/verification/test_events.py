@@ -292,9 +292,9 @@ def tool_velocity(t):
 )
 def test_an_arm_whose_tool_vibrates_at_500_hz(integrator, settings):
     """All changes of sign are found: of a velocity of the tool, and of a clock, at long steps too.
-    Independently: products of rotations at 20 000 instants, 1000 in a period. Velocities there are
+    Independently: products of rotations at 10 000 instants, 1000 in a period. Velocities there are
     off by what the run is, 1e-5 m/s of 9 m/s at most; accelerations are 3e4 m/s^2."""
-    t_end = 0.04
+    t_end = 0.02
     events = [
         dap.Event("link5.rd.y", name="tool"),
         dap.Event(lambda t, _: np.sin(2.0 * np.pi * 500.0 * t + 0.1), name="clock"),
@@ -303,12 +303,12 @@ def test_an_arm_whose_tool_vibrates_at_500_hz(integrator, settings):
         arm(), t_end=t_end, dt=t_end / 2, integrator=integrator, events=events, **settings
     )
     assert not any("too fast" in note for note in result.notes)
-    t = np.linspace(0.0, t_end, 20_001)
+    t = np.linspace(0.0, t_end, 10_001)
     signs = np.sign(tool_velocity(t)[1])
     expected = int(np.sum(signs[1:] * signs[:-1] < 0.0))
-    assert expected > 35
+    assert expected > 17
     tool = np.array([event.t for event in result.events if event.name == "tool"])
     assert len(tool) == expected
     assert np.abs(tool_velocity(tool)[1]).max() < 1e-5
     clock = [event.t for event in result.events if event.name == "clock"]
-    assert clock == pytest.approx((np.pi * np.arange(1, 41) - 0.1) / (1000.0 * np.pi), abs=1e-14)
+    assert clock == pytest.approx((np.pi * np.arange(1, 21) - 0.1) / (1000.0 * np.pi), abs=1e-14)

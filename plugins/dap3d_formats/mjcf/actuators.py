@@ -45,8 +45,7 @@ def read_actuators(reader: MjcfReader, inertia: JointInertia, keyframe: Keyframe
     acting = []
     for element, start in zip(elements, starts, strict=True):
         if element.number("group", 0.0) in disabled:
-            text = "an actuator of a group that is disabled"
-            reader.remarks.leave_out(element.place, text)
+            reader.remarks.leave_out(element.place, "an actuator of a group that is disabled")
         elif element.name != "plugin":
             acting.append((element, _targets(reader, element), start))
     reading = ActuatorReader(reader, inertia, [(e, targets) for e, targets, _ in acting])

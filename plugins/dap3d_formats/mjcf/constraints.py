@@ -172,5 +172,4 @@ def _hold_sum(
         ((q2, c2),) = others
         model.couplings.append(Coupling(name, q1, q2, -c2 / c1, a0 / c1, element.place))
     else:
-        terms = tuple(factors.items())
-        model.held.append(Tendon(name, rest=a0, terms=terms, place=element.place))
+        model.held.append(Tendon(name, rest=a0, terms=tuple(factors.items()), place=element.place))

@@ -97,11 +97,7 @@ class _Copier:
         return frame
 
     def _model(self, element: XmlElement) -> Document:
-        """The model that an element attaches.
-
-        Raises:
-            FormatError: there is none of that name, or its file cannot be read.
-        """
+        """The model that an element attaches."""
         source, folder = self.document.source, self.document.settings[""].folder
         name, models = element.require("model"), {}
         for model in self.document.section("asset", "model"):
@@ -156,8 +152,7 @@ class _Copier:
 
     def _copy_naming(self, names: set[tuple[str, str]], suffixes: list[str]) -> None:
         """Copy elements outside of bodies that name one of those that are copied."""
-        root = self.document.root
-        for section in (one for tag in NAMING for one in root.all(tag)):
+        for section in (one for tag in NAMING for one in self.document.root.all(tag)):
             children: list[XmlElement] = []
             for child in section:
                 if names.isdisjoint(_references(child)):
@@ -170,11 +165,7 @@ class _Copier:
 
 
 def _part(model: Document, element: XmlElement) -> tuple[list[XmlElement], list[XmlElement]]:
-    """What is attached of a model: elements of bodies, and sections.
-
-    Raises:
-        FormatError: there is no body or frame of the name that is given.
-    """
+    """What is attached of a model: elements of bodies, and sections."""
     root, tags = model.root, [tag for tag in ("body", "frame") if tag in element.attributes]
     worlds, place = root.all("worldbody"), element.place
     assets = [

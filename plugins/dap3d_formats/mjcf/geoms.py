@@ -140,11 +140,7 @@ class Geoms:
         return Geometry("mesh", mesh=path, scale=scale, pose=pose, **common)
 
     def _height_field(self, geom: XmlElement, frame: Frame, common: Any) -> Geometry | None:
-        """A height field, whose least number is 0 and whose greatest the height of its size.
-
-        Raises:
-            FormatError: it is not there, is no image, or has another number of heights.
-        """
+        """A height field, whose least number is 0 and whose greatest the height of its size."""
         name, heights = geom.require("hfield"), np.zeros((2, 2))
         field = self.fields.get(name)
         if field is None:
@@ -182,8 +178,7 @@ class Geoms:
         if kind in FLAT or mass == 0.0 or (mass < 0.0 and density == 0.0):
             return None
         if geom.get("shellinertia") == "true":
-            what = "a geom with shellinertia: give the body an <inertial>"
-            raise FormatError(what, geom.place)
+            raise FormatError("a geom with shellinertia: give the body an <inertial>", geom.place)
         if kind == "mesh":
             volume, com, unit_inertia = self._mesh_inertia(geom)
             pose = frame @ self.document.frame(geom)
@@ -234,11 +229,7 @@ class Geoms:
         return self.assets[name]
 
     def _mesh_inertia(self, geom: XmlElement) -> tuple[float, Any, Any]:
-        """Volume, mass centre, and inertia about it for a mass of 1, of a mesh asset.
-
-        Raises:
-            FormatError: it cannot be read, or encloses nothing.
-        """
+        """Volume, mass centre, and inertia about it for a mass of 1, of a mesh asset."""
         asset, rule = self._asset(geom), self._asset(geom).get("inertia", "legacy")
         given = {"file", "vertex"} & asset.attributes.keys()
         if not given or "builtin" in asset.attributes or rule not in ("legacy", "exact"):
@@ -260,11 +251,7 @@ class Geoms:
 
 
 def _inline(asset: XmlElement) -> tuple[Any, Any]:
-    """Vertices and triangles of a mesh without a file; those of its hull where it has no faces.
-
-    Raises:
-        FormatError: the numbers are no triples, or name no vertices.
-    """
+    """Vertices and triangles of a mesh without a file; those of its hull where it has no faces."""
     triples = {}
     for key in ("vertex", "face"):
         numbers = asset.numbers(key, None, ())
@@ -281,11 +268,7 @@ def _inline(asset: XmlElement) -> tuple[Any, Any]:
 
 
 def _hull(vertices: Any, asset: XmlElement) -> Any:
-    """The triangles of the convex hull of points, with their normals outwards.
-
-    Raises:
-        FormatError: the points lie in a plane.
-    """
+    """The triangles of the convex hull of points, with their normals outwards."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:

@@ -156,8 +156,7 @@ class MjcfReader:
 
     def _site(self, site: XmlElement) -> Frame:
         if "fromto" in site.attributes:
-            ends = np.array(site.numbers("fromto", 6)).reshape(2, 3)
-            return Frame(ends.mean(axis=0))
+            return Frame(np.array(site.numbers("fromto", 6)).reshape(2, 3).mean(axis=0))
         return self.document.frame(site)
 
     def _body(self, element: XmlElement, parent: str, frame: Frame, outer: str) -> None:
@@ -187,8 +186,7 @@ class MjcfReader:
                 gathered.append((self.document.settled(child, childclass), frame))
             elif child.name == "frame":
                 inner = child.get("childclass") or childclass
-                there = frame @ self.document.frame(child)
-                gathered += self._gathered(child, tags, there, inner)
+                gathered += self._gathered(child, tags, frame @ self.document.frame(child), inner)
         return gathered
 
     def _inertial(self, body: XmlElement, geoms: list[tuple[XmlElement, Frame]]) -> Inertial | None:

@@ -40,8 +40,7 @@ def read_joint(reader: SdfReader, element: XmlElement, scope: str) -> None:
         raise FormatError(f"joint {name}: type {type_!r} is unknown; one of {', '.join(KINDS)}",
                           element.place)  # fmt: skip
     parent, child = _end(reader, element, scope, "parent"), _end(reader, element, scope, "child")
-    frames = reader.frames
-    here = frames.in_world(name, element.place)
+    here = reader.frames.in_world(name, element.place)
     joint = Joint(
         name, KINDS[type_], parent, child,
         _of_link(reader, parent, element.place).inverse() @ here,
@@ -79,11 +78,7 @@ def read_gearbox(reader: SdfReader, element: XmlElement, scope: str) -> None:
 def _geared(
     reader: SdfReader, element: XmlElement, scope: str, reference: str, end: str, tag: str
 ) -> tuple[str, float]:
-    """The joint of an end of a gearbox on the reference body, and 1 or -1 to make it theta.
-
-    Raises:
-        FormatError: there is none, or it turns about another axis.
-    """
+    """The joint of an end of a gearbox on the reference body, and 1 or -1 to make it theta."""
     link = _end(reader, element, scope, end)
     ends = {_holder(reader, reference), _holder(reader, link)}
     hinges = [one for one in reader.model.joints.values() if one.kind == "revolute"]
@@ -117,11 +112,7 @@ def _holder(reader: SdfReader, link: str) -> str:
 def _direction(
     reader: SdfReader, name: str, element: XmlElement, tag: str, scope: str
 ) -> tuple[float, ...]:
-    """The direction of an axis of a joint, in the frame of the joint.
-
-    Raises:
-        FormatError: there is no such axis.
-    """
+    """The direction of an axis of a joint, in the frame of the joint."""
     axis = element.first(tag)
     if axis is None:
         raise FormatError(f"joint {name} has no <{tag}>; it is required", element.place)

@@ -19,8 +19,7 @@ class UrdfImporter(Importer):
 
             root = expanded(source, root)
         if root.name != "robot":
-            what = f"a URDF file is a <robot>, not a <{root.name}>"
-            raise FormatError(what, root.place)
+            raise FormatError(f"a URDF file is a <robot>, not a <{root.name}>", root.place)
         return UrdfReader(source, root).read()
 
 

@@ -59,11 +59,7 @@ class UrdfReader:
         return self.model
 
     def _join_world(self) -> None:
-        """A root link named world is the world itself, whose name the joints have already.
-
-        Raises:
-            FormatError: a link that moves has this name.
-        """
+        """A root link named world is the world itself, whose name the joints have already."""
         world = self.model.links.pop(WORLD, None)
         if world is None:
             return

@@ -51,9 +51,6 @@ def _with_defaults(source: Source, root: XmlElement) -> str:
     """The text of the file with defaults for arguments without one; "" where there are none.
 
     xacrodoc wants a default of each argument, ROS's launch files do not.
-
-    Raises:
-        FormatError: the user gives no value either.
     """
     bare = [one for one in root.all("xacro:arg") if one.get("default") is None]
     for element in bare:

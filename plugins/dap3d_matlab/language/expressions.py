@@ -74,11 +74,7 @@ _OUTSIDE = {
 
 
 def _call(name: str, values: list[Numbers], node: "Node") -> Numbers:
-    """The value of one of ``_FUNCTIONS``.
-
-    Raises:
-        RefusalError: the arguments do not fit, or the value is not finite and real.
-    """
+    """The value of one of ``_FUNCTIONS``."""
     if name in _FILLED:
         return _filled(name, values, node)
     count = 2 if name == "atan2" else 1
@@ -264,8 +260,7 @@ class Expressions:
             near = nearest(name, [*_FUNCTIONS, *MAKERS, *self.variables])
             remedy = "" if near else f"functions that are read: {', '.join(_FUNCTIONS)}"
             raise RefusalError(node, what, remedy, near)
-        values = [numbers(self.value(n), n) for n in arguments]
-        return _call(name, values, node)
+        return _call(name, [numbers(self.value(n), n) for n in arguments], node)
 
     def element(self, node: "Node", value: Any, arguments: list["Node"]) -> Any:
         """An element of a matrix or of an array of structures."""
@@ -332,8 +327,7 @@ class Expressions:
     def parts_of(self, node: "Node") -> tuple["Node", str, list["Node"] | None]:
         """Owner, name of the field, and its indices or None."""
         owner = node.child_by_field_name("object")
-        fields = node.children_by_field_name("field")
-        named = [n for n in fields if n.type not in (".", *EXTRAS)]
+        named = [n for n in node.children_by_field_name("field") if n.type not in (".", *EXTRAS)]
         if owner is None or owner.type not in ("identifier", "function_call") or len(named) != 1:
             raise RefusalError(node, "fields of fields are not read")
         (field,) = named

@@ -109,8 +109,7 @@ class Operation:
     ) -> Numbers:
         value = operand()
         while self._next_is(operators):
-            operator = self._take().operator
-            value = apply(operator, value, operand())
+            value = apply(self._take().operator, value, operand())
         return value
 
     def _signed(self) -> Numbers:

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from dap3d_core.interface.formats import from_quaternion
 from dap3d_core.scene import MISSING, Mistake, Scene
 from dap3d_matlab.files.report import remark
 from dap3d_matlab.language.structures import LIMITS
@@ -66,16 +67,16 @@ def _orientation(fields: Fields, struct: Struct) -> Any:
     if rows is None:
         return None
     A = np.array(rows)
-    p_of_A = parameters_of(A)
-    if np.abs(rotation_of(p_of_A) - A).max() > ROTATION_TOLERANCE:
+    p_of_A = tuple(parameters_of(A).tolist())
+    if np.abs(from_quaternion(p_of_A) - A).max() > ROTATION_TOLERANCE:
         what = f"should be a rotation matrix (A^T A = I, det A = 1, within {ROTATION_TOLERANCE:g})"
         fields.refuse(struct, "A", what)
         return None
     if "p" not in struct.given:
         words = "gives the orientation: p is worked out from it (the MATLAB program reads p alone)"
         fields.changed(struct, "A", words)
-        return tuple(p_of_A.tolist())
-    if np.abs(rotation_of(np.array(p) / max(np.linalg.norm(p), 1e-300)) - A).max() > 1e-3:
+        return p_of_A
+    if not 0.0 < np.dot(p, p) < np.inf or np.abs(from_quaternion(p) - A).max() > 1e-3:
         fields.refuse(struct, "A", "is another orientation than p", "give one of them")
         return None
     fields.left_out(struct, "A", "says what p says: p is read")
@@ -98,13 +99,6 @@ def parameters_of(A: Numbers) -> Numbers:
     with np.errstate(all="ignore"):
         p = np.nan_to_num(p / np.linalg.norm(p))
     return np.asarray(-p if p[0] < 0.0 else p)
-
-
-def rotation_of(p: Numbers) -> Numbers:
-    """The rotation matrix (2 e0^2 - 1) I + 2 (e e^T + e0 e~) of Euler parameters of unit length."""
-    e0, e = p[0], p[1:]
-    skew = np.array([[0.0, -e[2], e[1]], [e[2], 0.0, -e[0]], [-e[1], e[0], 0.0]])
-    return np.asarray((2.0 * e0**2 - 1.0) * np.eye(3) + 2.0 * (np.outer(e, e) + e0 * skew))
 
 
 def _angular_velocity(fields: Fields, struct: Struct, p: Any) -> Any:
@@ -194,8 +188,7 @@ def add_animation(scene: Scene, fields: Fields) -> None:
         place = next(iter(limits.values()))[1]
         fields.report.unused.append(remark(place, text))
     elif given and None not in given:
-        pairs = zip(given[::2], given[1::2], strict=True)
-        scene.animation.limits = tuple(pairs)
+        scene.animation.limits = tuple(zip(given[::2], given[1::2], strict=True))
         fields.places["animation.limits"] = limits["xmin"][1]
 
 

@@ -187,8 +187,7 @@ class _Values:
         array = self.fields.model.arrays.get(rule.how)
         if rule.how not in ("Points", "Vectors1") or slot not in "ij" or not array or not value:
             return
-        member = array[int(str(value)[1:]) - 1]
-        number = member.value("Bindex")
+        number = array[int(str(value)[1:]) - 1].value("Bindex")
         if getattr(number, "size", 0) == 1:
             self.bodies.setdefault(slot, (f"{number[0, 0]:g}", rule.field))
 

@@ -228,11 +228,7 @@ def _folder_importer(folder: Path, wanted: str | None) -> FolderImporter | None:
 
 
 def _refuse_omissions(remarks: Sequence[Any], strict: bool) -> None:
-    """Refuse a model of which something is left out, where strict.
-
-    Raises:
-        SceneError: each omission, with its line.
-    """
+    """Refuse a model of which something is left out, where strict."""
     if strict and remarks:
         raise SceneError(
             Mistake("", MISSING, f"{one.text}: it would be left out", file=one.place.file,
@@ -285,11 +281,7 @@ def read_articulation(
 
 
 def _require_file(file: Path) -> None:
-    """Refuse a path that is no file.
-
-    Raises:
-        FormatError: it is missing or a folder; with names of files that may be meant.
-    """
+    """Refuse a path that is no file."""
     if os.path.isdir(file):
         models = sorted(one.name for one in file.iterdir() if one.suffix in SUFFIXES)
         names = f", such as {', '.join(models[:5])}" if models else ""
@@ -310,9 +302,6 @@ def _importer(source: SourceFiles, wanted: str | None) -> tuple[Importer, str]:
     """The importer of a file: the one wanted, named like its suffix, or of its suffix and root.
 
     They are loaded one after the other until one fits, those of dap3d itself first.
-
-    Raises:
-        FormatError: no installed format is that of the file.
     """
     formats = extensions("importer")
     if wanted is not None:
@@ -346,11 +335,7 @@ def _importer(source: SourceFiles, wanted: str | None) -> tuple[Importer, str]:
 def _coordinates(
     given: Mapping[str, Any] | None, model: Articulation, *, positions: bool
 ) -> dict[str, tuple[float, ...]]:
-    """Coordinates of joints as tuples.
-
-    Raises:
-        FormatError: there is no such joint, or it has another number of them, or not numbers.
-    """
+    """Coordinates of joints as tuples."""
     coordinates, what = {}, "position" if positions else "rate"
     quaternions = {"ball": 1, "free": 1} if positions else {}
     for name, value in _named(f"{what}s", given).items():
@@ -376,11 +361,7 @@ def _coordinates(
 
 
 def _named(what: str, given: Any) -> Mapping[str, Any]:
-    """Values by name, none for None.
-
-    Raises:
-        FormatError: they are something else.
-    """
+    """Values by name, none for None."""
     if given is not None and not isinstance(given, Mapping):
         raise FormatError(f"{what} = {given!r}: should be a dictionary of names and values")
     return given or {}

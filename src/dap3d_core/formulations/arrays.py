@@ -133,8 +133,7 @@ def _friction_size(model: Model, plan: Plan) -> int:
     if model.contacts:
         from dap3d_core.formulations.contacts import equations
 
-        count = model.contact_count
-        size += equations.memory_size(model.body_count + 1, plan.row_size, count)
+        size += equations.memory_size(model.body_count + 1, plan.row_size, model.contact_count)
     return size
 
 
@@ -166,8 +165,7 @@ def _contacts_of(
         if group.loaded is not None and type_.resists:
             rows[:, equations.UNDER] = group.loaded - first
         elif group.loaded is not None:
-            joints = plan.joint_row[group.loaded]
-            rows[:, equations.LOAD] = joints + type_.load[0]
+            rows[:, equations.LOAD] = plan.joint_row[group.loaded] + type_.load[0]
             rows[:, equations.LOADS] = len(type_.load)
             rows[:, equations.PUSHES] = type_.pushes
         table[group.members - first] = rows

@@ -57,7 +57,6 @@ def tableau_of(method: "RungeKuttaMethod") -> Tableau:
         a=lower_triangle(*method.a, method.b),
         e=errors,
         d=[[0.0] * (s + 1)] if errors else [],
-        dense_order=3 if errors else 0,
         exponent=1.0 / method.order - 0.75 * beta,
         beta=beta,
         factor_min=1.0 / 5.0,

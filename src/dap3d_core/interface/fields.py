@@ -206,8 +206,7 @@ def vec3(
     With ``in_ground`` they are components in ground axes: a scene that is included in another, and
     turned there, has them turned.
     """
-    spec = FieldSpec("vec3", default, unit, doc, direction=direction, in_ground=in_ground)
-    return field_of(spec)
+    return field_of(FieldSpec("vec3", default, unit, doc, direction=direction, in_ground=in_ground))
 
 
 def numbers(
@@ -371,8 +370,7 @@ def angle(first: str, second: str, about: str, *, doc: str = "") -> Any:
     Offers ``theta`` and ``theta_dot`` under its name: atan2(k . (a x b), a . b - (a . k) (b . k)),
     unwound (turns are counted at accepted steps), and its rate k . (w_j - w_i).
     """
-    spec = FieldSpec("angle", None, "rad", doc, given=False, axes=(first, second, about))
-    return field_of(spec)
+    return field_of(FieldSpec("angle", None, "rad", doc, given=False, axes=(first, second, about)))
 
 
 def specs_of(type_: type) -> dict[str, FieldSpec]:

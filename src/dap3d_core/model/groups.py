@@ -365,11 +365,7 @@ class Grouping:
 
 
 def _each(make: Callable[[Any], Group], parts: Iterable[Any]) -> tuple[Group, ...]:
-    """A group of each part.
-
-    Raises:
-        PrepareError: what is wrong in all of them.
-    """
+    """A group of each part."""
     made: list[Group] = []
     faults: list[tuple[int, str]] = []
     for part in parts:

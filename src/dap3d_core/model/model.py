@@ -216,8 +216,7 @@ class Model(Bodies):
         """Names of forces that depend on multipliers: friction of joints, forces on reactions."""
         groups = (*self.friction, *(group for group in self.forces if group.read))
         names = (self.force_names[k] for group in groups for k in group.members.tolist())
-        first = len(self.joint_names) - self.contact_count
-        return (*names, *self.joint_names[first:])
+        return (*names, *self.contact_names)
 
     @cached_property
     def brought_forces(self) -> dict[str, str]:

@@ -11,9 +11,6 @@ def _import_matplotlib() -> None:
     A ``matplotlibrc`` there may be that of a stranger's model, and may have names read as TeX.
     A script that has imported matplotlib before has decided for itself. That its own cache cannot
     be kept, where the home folder cannot be written, matters to nobody here.
-
-    Raises:
-        OSError: ``MPLBACKEND`` names no backend.
     """
     if "matplotlib" in sys.modules:
         return

@@ -38,8 +38,7 @@ def _shaped(t: Floats, x: Floats, cuts: Sequence[float]) -> Floats:
     slopes = np.full((2, len(t) - 1), np.nan)
     broken = np.isnan(x[:-1]) | np.isnan(x[1:])
     broken[[k - 1 for k in np.searchsorted(t, cuts) if 0 < k < len(t)]] = True
-    ends = [-1, *np.flatnonzero(broken), len(t) - 1]
-    for first, last in pairwise(ends):
+    for first, last in pairwise([-1, *np.flatnonzero(broken), len(t) - 1]):
         if last > first + 1:
             part = slice(first + 1, last + 1)
             of_part = PchipInterpolator(t[part], x[part])(t[part], 1)

@@ -75,8 +75,7 @@ class RootLocusPicture(style.OnePanel):
     def draw(self, figure: Figure) -> list[Axes]:
         """Draw on an empty figure."""
         ax = figure.add_subplot()
-        lines = self._draw_lines(ax)
-        bar = figure.colorbar(lines, ax=ax, pad=0.02)
+        bar = figure.colorbar(self._draw_lines(ax), ax=ax, pad=0.02)
         bar.ax.tick_params(labelsize=style.LETTERS)
         label = style.with_unit(self.modes.parameter, self.modes.unit)
         bar.set_label(style.folded(label, 15 * figure.get_figheight()), fontsize=style.LETTERS)

@@ -97,11 +97,7 @@ def extension_listing(limit_s: float | None = LOAD_LIMIT) -> list[PluginInfo]:
 
 
 def _load(source: Source, limit_s: float | None = None) -> Any:
-    """What an entry point names, loaded within a time limit, s.
-
-    Raises:
-        PluginError: names distribution, module, reason and remedy.
-    """
+    """What an entry point names, loaded within a time limit, s."""
     hook = EXTENSIONS[source.kind][1]
     module_name, base_name = _BASES[source.kind]
     specs = importlib.import_module(module_name)
@@ -109,8 +105,7 @@ def _load(source: Source, limit_s: float | None = None) -> Any:
     with guard(source, []), within(limit_s):
         if source.fault:
             raise PluginError(source.fault)
-        module = importlib.import_module(source.module)
-        results = getattr(hooks_of(module, specs), hook)()
+        results = getattr(hooks_of(importlib.import_module(source.module), specs), hook)()
         brought = [one for result in results for one in result or ()]
         if not all(_is_a(one, base) for one in brought):
             raise PluginError(f"{hook}() should return a list of {base_name}")

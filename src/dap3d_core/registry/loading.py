@@ -55,8 +55,7 @@ def load(
         type_: Any = source.type
         if type_ is None:
             module = importlib.import_module(source.module)
-            types = types_of(module, (source.kind,))[source.kind]
-            type_ = _with_keyword(source, types)
+            type_ = _with_keyword(source, types_of(module, (source.kind,))[source.kind])
             _loaded[source, module] = examined(type_)
         return examined(type_)
 
@@ -90,8 +89,7 @@ def load_file(path: Path, notes: list[str]) -> list[Source]:
         PluginError: names file, reason and remedy.
     """
     with guard(Source("", "", str(path)), notes):
-        module = _module_of(path)
-        types = types_of(module, tuple(GROUPS))
+        types = types_of(_module_of(path), tuple(GROUPS))
         sources = [
             Source(kind, type_.keyword, str(path), type=type_)
             for kind in GROUPS

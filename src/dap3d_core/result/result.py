@@ -181,8 +181,7 @@ class Result(ResultDisplay, ResultContacts):
 
     def __reduce__(self) -> Any:
         """For other processes: everything but the model and the evaluator."""
-        arrays = (*self.arrays.columns(), self.arrays.u_error)
-        return _received, (self.summary, arrays, self.record)
+        return _received, (self.summary, (*self.arrays.columns(), self.arrays.u_error), self.record)
 
     # ------------------------------------------------------------------ stored
 

@@ -161,12 +161,10 @@ class _Part:
 
     def _entries(self, table: str, mistakes: MistakeList) -> dict[str, Any]:
         if table == "parameters":
-            values = self.part.parameters
-            own = {n: self._value(v) for n, v in values.items()}
+            own = {n: self._value(v) for n, v in self.part.parameters.items()}
             return {f"{self.name}_{n}": v for n, v in (own | self.given).items()}
         if table == "outputs":
-            outputs = self.part.outputs
-            return {self.words[n]: self._output(value) for n, value in outputs.items()}
+            return {self.words[n]: self._output(value) for n, value in self.part.outputs.items()}
         entries = {}
         for old, entry in getattr(self.part, table).items():
             name = self.words[old] if table == "inputs" else self.names[old]

@@ -359,16 +359,12 @@ def restore_system(run: RunState, stored: Mapping[str, Any]) -> None:
     Raises:
         ValueError: they are of another model, or not finite.
     """
-    evaluator, changed = (
-        run.evaluator,
-        run.event_locator.changed_forces if run.event_locator else (),
-    )
-    par, settings = evaluator.system.par, evaluator.system.settings
-    changes = np.zeros(len(par), dtype=bool)
-    for places in evaluator.turn_places():
+    par, settings = run.evaluator.system.par, run.evaluator.system.settings
+    changes, locator = np.zeros(len(par), dtype=bool), run.event_locator
+    for places in run.evaluator.turn_places():
         changes[places] = True
-    if run.event_locator and changed:
-        changes |= run.event_locator.numbers.changeable(changed)
+    if locator and locator.changed_forces:
+        changes |= locator.numbers.changeable(locator.changed_forces)
     new = restored("system.par", par, stored.get("system.par"), np.flatnonzero(~changes))
     counts: Any = stored.get("system.settings")
     check_alike("system.settings", counts, settings)

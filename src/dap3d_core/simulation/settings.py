@@ -107,7 +107,11 @@ def replaced_notes(
         asked: what it was called with.
     """
     if not integrator_named(settings.integrator).steps_contacts:
-        return []
+        if (step := asked.get("contact_step")) is None:
+            return []
+        has_contacts = compiled.model.contact_count > 0
+        why = "contacts are followed by events" if has_contacts else "the scene has no contacts"
+        return [f"contact_step {step:g} left out: {why}"]
     of_scene, given = compiled.scene.simulation, {}
     for name in ("integrator", "step", "atol", "rtol"):
         value, written = asked.get(name), getattr(of_scene, name)

@@ -20,7 +20,7 @@ MAX_POINTS, MAX_VARIED = 10**8, 1000
 #: Samples of (0, 1) stay so far from its ends, where the normal distribution is infinite.
 MARGIN = 2.0**-53
 NO_NUMBER = f"is no finite number of at most {LARGEST:g} in size"
-FORMS = "1:5:9 (from:to:count), 1:100:5:log, 10,50,100 (a list)"
+FORMS = "1:5:9 (from:to:count), 1:100:5:log or 10,50,100 (a list)"
 SAMPLED = "1:5 (from:to), 1:100:log, 3~0.1 (mean~standard deviation), 10,50,100 (one of these)"
 
 

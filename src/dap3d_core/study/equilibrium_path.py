@@ -31,8 +31,9 @@ from dap3d_core.simulation.equilibrium.rest import least_multipliers
 from dap3d_core.simulation.equilibrium.search import stability_of
 from dap3d_core.simulation.initial.start_state import Start, StartState
 from dap3d_core.simulation.settings import compiled_for
+from dap3d_core.study.design import FORMS
 from dap3d_core.study.outputs import Output, Reduction
-from dap3d_core.study.parameters import FORMS, SceneParameter, read_values, with_values
+from dap3d_core.study.parameters import SceneParameter, read_values, with_values
 
 if TYPE_CHECKING:
     import xarray

@@ -11,12 +11,12 @@ import numpy as np
 
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.registry.suggestions import nearest
+from dap3d_core.registry.suggestions import nearest, some
 from dap3d_core.scene import Instance, Mistake, Scene, SceneError, Simulation, ValidatedScene
 from dap3d_core.scene.coerce import canonical
 from dap3d_core.scene.tables import LIMITS, NAMED, Element
 from dap3d_core.settings import SETTINGS
-from dap3d_core.study.design import design_of
+from dap3d_core.study.design import FORMS, design_of
 
 AXES = ("x", "y", "z")
 EULER_PARAMETERS = ("e0", "e1", "e2", "e3")
@@ -35,11 +35,7 @@ BODY_DEFAULTS: dict[str, Any] = {"mass": 1.0, "Jp": (1.0, 1.0, 1.0)}
 #: Units of fields that do not belong to a type.
 UNITS = {"mass": "kg", "Jp": "kg m^2", "r": "m", "r_0": "m", "r_dot": "m/s", "w": "rad/s",
          "sPp": "m", "t_end": "s", "dt": "s", "step": "s", "Omega": "rad/s"}  # fmt: skip
-#: Largest number of names in a message.
-MAX_NAMES = 6
 FORM = "names are TABLE.NAME.FIELD, such as bodies.crank.mass, simulation.FIELD, parameters.NAME"
-
-FORMS = "1:5:9 (from:to:count), 1:100:5:log or 10,50,100 (a list)"
 
 
 @attrs.frozen
@@ -243,7 +239,7 @@ def _resolve(checked: ValidatedScene, name: Any) -> SceneParameter | Mistake:
         path = (table, rest.pop(0))
     fields = {field.path[-1]: field for field in _fields(checked, path)}
     if not rest:
-        listed = _listed([f.name for f in fields.values()])
+        listed = some([f.name for f in fields.values()])
         return Mistake("vary", name, f"this is no single number; it has {listed}")
     if rest[0] not in fields:
         what = f"{'.'.join(path)} has no number {rest[0]!r}"
@@ -254,8 +250,8 @@ def _resolve(checked: ValidatedScene, name: Any) -> SceneParameter | Mistake:
         return parameter
     parts = [p.name for p in field.parameters()]
     if not rest:
-        return Mistake("vary", name, f"this is no single number; it has {_listed(parts)}")
-    what = f"{field.name} has no number {'.'.join(rest)!r}; it has {_listed(parts)}"
+        return Mistake("vary", name, f"this is no single number; it has {some(parts)}")
+    what = f"{field.name} has no number {'.'.join(rest)!r}; it has {some(parts)}"
     if parts == [field.name]:
         what = f"{field.name} is a number; it has no parts"
     return Mistake("vary", name, what, nearest(name, parts))
@@ -352,11 +348,7 @@ def _unknown(
     near = nearest(rest[0], known)
     if near:
         return Mistake("vary", name, what, ".".join((*path, near, *rest[1:])))
-    return Mistake("vary", name, f"{what}; it has {_listed(list(known)) if known else 'nothing'}")
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names[:MAX_NAMES]) + (", ..." if len(names) > MAX_NAMES else "")
+    return Mistake("vary", name, f"{what}; it has {some(list(known)) if known else 'nothing'}")
 
 
 def read_values(own: ValidatedScene, name: str, values: Any) -> tuple[SceneParameter, Floats]:

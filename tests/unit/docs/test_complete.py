@@ -357,6 +357,7 @@ def dap_models():
     return [name.rpartition("/")[2] for name in dap.shipped_models()]
 
 
+@pytest.mark.slow
 def test_links_lead_to_pages_of_the_site(source):
     """Also those that lead out of docs, and those between models, which are included elsewhere."""
     from dap3d_site.gallery import models

@@ -283,7 +283,7 @@ def test_the_ledger_of_a_large_result_takes_little_memory(monkeypatch, tmp_path)
     monkeypatch.setattr("dap3d_core.result.open.LARGE", 200)
     monkeypatch.setattr("dap3d_core.result.arrays.BLOCK", 2**12)
     scene = problems.chain(40)
-    dap.simulate(scene, t_end=1.0, dt=1e-3, rtol=1e-4, output=tmp_path / "run.nc")
+    dap.simulate(scene, t_end=0.1, dt=1e-4, rtol=1e-4, output=tmp_path / "run.nc")
     result = dap.open(tmp_path / "run.nc")
     tracemalloc.start()
     assert result.ledger["position"].ok

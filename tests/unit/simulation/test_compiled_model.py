@@ -5,7 +5,7 @@ import time
 
 import pytest
 from support import problems
-from support.plain import jit_is_on
+from support.plain import jit_is_on, long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.simulation.compiled_model import log_first_compilation
@@ -96,6 +96,7 @@ def test_auto_takes_joint_coordinates_for_trees_of_many_bodies(make, method, mon
     assert ("method joint would take some" in compiled.explain()) == (method != "joint")
 
 
+@long_in_plain_python
 def test_auto_keeps_coordinates_of_bodies_where_joints_rub(monkeypatch):
     """There method joint takes longer: nothing recommends it, and its runs say so."""
     monkeypatch.setattr("dap3d_core.simulation.compiled_model.MANY_BODIES", 16)
@@ -110,6 +111,7 @@ def test_auto_keeps_coordinates_of_bodies_where_joints_rub(monkeypatch):
     assert any("two to three times" in note and "rubbing" in note for note in slow.notes)
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("integrator", ["radau", "auto"])
 def test_auto_keeps_coordinates_of_bodies_for_integrators_that_need_them(integrator, monkeypatch):
     """Whether the scene says so, the run of a scene, or that of a compiled model."""

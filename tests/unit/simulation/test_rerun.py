@@ -33,6 +33,7 @@ def test_a_run_made_again_is_equal(settings, tmp_path):
     assert [f.name for f in tmp_path.iterdir()] == ["run.nc"]
 
 
+@long_in_plain_python
 def test_a_run_is_made_again_by_the_method_that_auto_chose_then(monkeypatch):
     """As the choice was before it looked for joint coordinates."""
     first = dap.simulate(problems.chain(3), **SHORT)

@@ -376,6 +376,19 @@ def test_a_run_that_blows_up_within_a_step_names_the_joint_that_did_it():
         )  # assembled and projected, the link would be as long as it is
 
 
+def test_a_step_of_contacts_that_are_not_stepped_is_named():
+    scene = dap.Scene(name="ball")
+    scene.add_body("ball", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 0.1))
+    given = {"t_end": 0.01, "dt": 0.01, "contact_step": 1e-3}
+    assert (
+        "contact_step 0.001 left out: the scene has no contacts"
+        in dap.simulate(scene, **given).notes
+    )
+    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1)
+    notes = dap.simulate(scene, **given).notes
+    assert "contact_step 0.001 left out: contacts are followed by events" in notes
+
+
 @pytest.mark.parametrize(
     ("asked", "words"),
     [

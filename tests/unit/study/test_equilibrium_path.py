@@ -91,6 +91,7 @@ def test_all_points_are_equilibria(snap):
     assert np.sum(snap.values == 0.0) == 3
 
 
+@pytest.mark.slow
 def test_stability_between_turning_points(snap):
     """Unstable from the first turning point to the second: the stiffness is dP/dz."""
     z, h = snap.of("node.r.z"), 1e-5
@@ -119,6 +120,7 @@ def test_quantities_depend_on_the_parameter(snap):
         snap.of("nod.r.z")
 
 
+@pytest.mark.slow
 def test_point_as_equilibrium(snap):
     """A point is an equilibrium with a scene of its own."""
     k = int(np.flatnonzero(snap.given)[3])
@@ -128,6 +130,7 @@ def test_point_as_equilibrium(snap):
     assert found.scene().forces["load"].fields["f"][2] == snap.values[k]
 
 
+@pytest.mark.slow
 def test_data_of_a_path(snap):
     """The same numbers as data of lists, and as a data set."""
     data = snap.to_dict("node.r.z")
@@ -221,6 +224,7 @@ def test_path_begins_where_a_start_leads():
     assert found.stable.all()
 
 
+@pytest.mark.slow
 def test_picture_of_a_path(snap):
     """Unstable parts are dashed, turning points marked."""
     matplotlib.use("Agg")

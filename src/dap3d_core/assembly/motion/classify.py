@@ -216,8 +216,7 @@ def _attempt(
             fitting = candidate.take(np.flatnonzero(_fits(candidate, joints, rng)))
             if fitting.joints.size:
                 usable[fitting.joints] = False
-                members = group.members[fitting.joints]
-                motions.append(attrs.evolve(fitting, joints=members))
+                motions.append(attrs.evolve(fitting, joints=group.members[fitting.joints]))
     reasons = np.full(group.count, NOT_CONSTANT, dtype=object)
     reasons[varies] = NOT_INVARIANT
     reasons[~joints.is_regular] = DEPENDENT
@@ -298,8 +297,7 @@ def _aligned(
 ) -> tuple[tuple[Part, ...], Floats]:
     """Parts that are constant in the bodies of slots, and their twists, by the type's names."""
     start = Pose(joints.start.r[members], joints.start.p[members])
-    axes = NamedAxes(group.take(members), start, slots, joints.rows.length)
-    return axes.aligned(kinds, screws)
+    return NamedAxes(group.take(members), start, slots, joints.rows.length).aligned(kinds, screws)
 
 
 def _motions(

@@ -109,8 +109,7 @@ def relative_motion(
     i, j = motion.body_i, motion.body_j
     r_i, r_j, v_i, v_j, w_i, w_j = (_of(x, bodies) for x in (r, v, w) for bodies in (i, j))
     p_i, p_j = (_of(p, bodies, (1.0, 0.0, 0.0, 0.0)) for bodies in (i, j))
-    arm = r_i - r_j
-    v_rel = to_body(p_i, v_i - v_j - cross(w_j, arm))
+    v_rel = to_body(p_i, v_i - v_j - cross(w_j, r_i - r_j))
     return relative(Pose(r_j, p_j), Pose(r_i, p_i)), np.concatenate(
         [v_rel, to_body(p_i, w_i - w_j)], axis=-1
     )

@@ -251,8 +251,7 @@ def _show(console: "Terminal", data: dict[str, Any], *, names: bool) -> None:
     if data["fields"]:
         rows = [(f["name"], f["kind"], default_text(f), f["unit"] or "-", meaning_text(f))
                 for f in data["fields"]]  # fmt: skip
-        columns = ("field", "kind", "default", "unit", "meaning")
-        console.table(columns, rows, fixed=(0, 1, 3))
+        console.table(("field", "kind", "default", "unit", "meaning"), rows, fixed=(0, 1, 3))
     else:
         console.say("none", indent=2)
     if data["variants"]:

@@ -32,8 +32,7 @@ def _show(console: "Terminal", data: dict[str, Any]) -> None:
         ]
         if group:
             console.title(group)
-        columns = ("model", "bodies", "joints", "what it is")
-        console.table(columns, rows, right=(1,), fixed=(0,))
+        console.table(("model", "bodies", "joints", "what it is"), rows, right=(1,), fixed=(0,))
     if own := [name for name, model in data.items() if model["own_types"]]:
         console.say(f"With a type of its own, to be run with --allow-code: {', '.join(own)}")
 
@@ -48,8 +47,7 @@ def _data(folder: Path) -> dict[str, Any]:
     try:
         scene = load(folder)
     except SceneError as error:
-        empty = {"description": str(error), "bodies": 0, "joints": {}, "own_types": False}
-        return data | empty
+        return data | {"description": str(error), "bodies": 0, "joints": {}, "own_types": False}
     return data | {
         "description": str(scene.description),
         "bodies": len(scene.bodies),

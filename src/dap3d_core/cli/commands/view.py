@@ -74,8 +74,7 @@ def view(
     if "sweep" in page.data:
         about["points"] = len(page.data["sweep"]["points"])
         contents = f"{about['points']} points"
-    notes = page.data["about"]["view_notes"]
-    show_written(target, contents, about, notes)
+    show_written(target, contents, about, page.data["about"]["view_notes"])
     if opens:
         _open(target)
     return DONE

@@ -327,8 +327,7 @@ def _show_ledger(console: Terminal, data: dict[str, Any]) -> None:
          verdicts[e["ok"]])
         for name, e in data["ledger"].items()
     ]  # fmt: skip
-    columns = ("quantity", "value", "limit", "ok")
-    console.table(columns, rows, right=(1, 2), fixed=(0, 1, 2, 3))
+    console.table(("quantity", "value", "limit", "ok"), rows, right=(1, 2), fixed=(0, 1, 2, 3))
     console.items(_violations(data), "red")
 
 

@@ -124,8 +124,7 @@ def command(
     def decorate(function: Callable[..., int]) -> Command:
         for option in reversed((*options, DEBUG, NO_COLOR)):
             function = option(function)
-        make = click.command(name, cls=Command, short_help=short_help, saves=saves)
-        return make(function)
+        return click.command(name, cls=Command, short_help=short_help, saves=saves)(function)
 
     return decorate
 

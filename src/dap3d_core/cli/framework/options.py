@@ -91,8 +91,7 @@ def _setting(setting: Setting) -> Option:
     """The option of a setting of a run."""
     text = f"{setting.text[0].upper()}{setting.text[1:]}."
     if setting.kind == "truth":
-        flags = f"{setting.option}/--no-{setting.option[2:]}"
-        return click.option(flags, default=None, help=text)
+        return click.option(f"{setting.option}/--no-{setting.option[2:]}", default=None, help=text)
     if setting.kind in ("word", "integrator"):  # those of packages are checked with the scene
         if setting.name in ("method", "integrator"):
             return click.option(setting.option, metavar="NAME", help=text)
@@ -181,7 +180,7 @@ def over_values(over: str) -> Iterator[tuple[str, str]]:
         Refused: it is not PARAMETER=FROM:TO:N.
     """
     from dap3d_core.scene import SceneError
-    from dap3d_core.study.parameters import FORMS
+    from dap3d_core.study.design import FORMS
 
     name, sign, values = (part.strip() for part in over.rpartition("="))
     if not (name and sign and values):

@@ -153,8 +153,7 @@ class SceneElements:
                     joint = attrs.evolve(joint, kind="fixed")
                 self.joints.append(joint)
             else:
-                what = f"joint {name}: no joint of a model is of type {element.type!r}"
-                raise FormatError(what)
+                raise FormatError(f"joint {name}: no joint of a model is of type {element.type!r}")
 
     def _fixed(self, element: Element) -> None:
         body, other = str(element.fields["body_i"]), str(element.fields.get("body_j", GROUND))
@@ -181,8 +180,7 @@ class SceneElements:
 
 def leave_out(remarks: Remarks, element: Element, why: str, *, motion: bool = True) -> None:
     """Remark that an element of a scene is left out."""
-    text = f"{element.name} of type {element.type}: {why}"
-    remarks.leave_out(NOWHERE, text, motion=motion)
+    remarks.leave_out(NOWHERE, f"{element.name} of type {element.type}: {why}", motion=motion)
 
 
 @attrs.define(eq=False)
@@ -225,8 +223,7 @@ def add_actuators(builder: ModelBuilder, scene: Scene) -> set[str]:
         for joint in builder.elements.joints:
             gear = _gear(builder, joint, users)
             if gear:
-                bounds = _bounds(users[0], "input")
-                actuator = Actuator(name, joint.name, gear, control=bounds)
+                actuator = Actuator(name, joint.name, gear, control=_bounds(users[0], "input"))
                 builder.model.actuators.append(actuator)
                 taken |= {element.name for element in users}
                 if given.value:

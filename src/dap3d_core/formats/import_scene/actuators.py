@@ -66,7 +66,6 @@ def _act_in_joint(
     builder: SceneBuilder, model: Articulation, actuator: Actuator, name: str
 ) -> None:
     """Add what acts on both sides of a joint; the force of a slider on the line of its axis."""
-    scene, names = builder.scene, builder.names
     joint = from_ground(builder, model.joints[actuator.joint])
     bounds = _bounds(control=actuator.control, force=actuator.force, activation=actuator.active)
     if bounds or actuator.activation:
@@ -76,9 +75,9 @@ def _act_in_joint(
         if actuator.activation:
             given |= {"activation": actuator.activation, "time": actuator.time,
                       "z_0": actuator.start[0]}  # fmt: skip
-        scene.add_force(
-            "actuator", names.free("forces", f"{name}_force"), control=name, gain=actuator.gear,
-            joint=names.scene_names["joints", joint.name], **bounds,
+        builder.add_force(
+            "actuator", f"{name}_force", control=name, gain=actuator.gear,
+            joint=builder.names.scene_names["joints", joint.name], **bounds,
             **{key: value for key, value in given.items() if value},
         )  # fmt: skip
         return
@@ -89,11 +88,10 @@ def _act_in_joint(
         if body == GROUND:
             continue
         vector = tuple((sign * actuator.gear * (frame.A @ axis) + 0.0).tolist())
-        force = names.free("forces", f"{name}_{end}")
         if joint.kind == "revolute":
-            scene.add_force("np", force, body_i=body, np=vector, input=name)
+            builder.add_force("np", f"{name}_{end}", body_i=body, np=vector, input=name)
         else:
-            scene.add_force("fp", force, P_i=ends.point(end), fp=vector, input=name)
+            builder.add_force("fp", f"{name}_{end}", P_i=ends.point(end), fp=vector, input=name)
 
 
 def _act_on_link(builder: SceneBuilder, actuator: Actuator, name: str) -> None:
@@ -103,11 +101,9 @@ def _act_on_link(builder: SceneBuilder, actuator: Actuator, name: str) -> None:
     given = {"input": name} | _bounds(input=actuator.control)
     if force.any():
         point = builder.point_at(body, frame.r, f"{name}_point")
-        at = builder.names.free("forces", f"{name}_force")
-        builder.scene.add_force("fp", at, P_i=point, fp=float_tuple(force), **given)
+        builder.add_force("fp", f"{name}_force", P_i=point, fp=float_tuple(force), **given)
     if moment.any():
-        about = builder.names.free("forces", f"{name}_moment")
-        builder.scene.add_force("np", about, body_i=body, np=float_tuple(moment), **given)
+        builder.add_force("np", f"{name}_moment", body_i=body, np=float_tuple(moment), **given)
 
 
 def _act_on_tendon(builder: SceneBuilder, model: Articulation, actuator: Actuator) -> None:
@@ -127,8 +123,8 @@ def _act_on_tendon(builder: SceneBuilder, model: Articulation, actuator: Actuato
         given["time"] = actuator.time
     if actuator.stiffness:
         fields["length"] = 0.0
-    builder.scene.add_force(
-        keyword, builder.names.free("forces", f"{name}_force"), **fields, control=name,
+    builder.add_force(
+        keyword, f"{name}_force", **fields, control=name,
         **({} if actuator.muscle else {"gain": -actuator.gear}),
         **_bounds(control=actuator.control, activation=actuator.active, tension=(-high, -low)),
         **{key: value for key, value in given.items() if value},
@@ -166,8 +162,7 @@ def add_tendons(builder: SceneBuilder, model: Articulation) -> None:
                 _add_slider(builder, model, tendon, fields)
             spring |= {"length": tendon.rest, "play": tendon.play or None}
         if tendon.stiffness or tendon.damping:
-            name = builder.names.free("forces", f"{tendon.name}_spring")
-            builder.scene.add_force(keyword, name, **fields, **spring)
+            builder.add_force(keyword, f"{tendon.name}_spring", **fields, **spring)
 
 
 def line_of(
@@ -267,11 +262,10 @@ def _add_stops(
     builder.remarks.translate(tendon.place, text, motion=True)
     for side, sign, bound in (("max", 1.0, upper), ("min", -1.0, lower)):
         if isfinite(bound):  # below its least length its negative is too long
-            name = builder.names.free("forces", f"{tendon.name}_{side}_stop")
             given = {"coefs": tuple(sign * c for c in fields["coefs"]), "x_0": sign * fields["x_0"]}
-            builder.scene.add_force(
-                keyword, name, **(fields | given), length=sign * bound, k=inertia / TIME**2,
-                c=2.0 * inertia / TIME, slack=True,
+            builder.add_force(
+                keyword, f"{tendon.name}_{side}_stop", **(fields | given), length=sign * bound,
+                k=inertia / TIME**2, c=2.0 * inertia / TIME, slack=True,
             )  # fmt: skip
 
 
@@ -279,8 +273,8 @@ def _add_limits(builder: SceneBuilder, tendon: Tendon, ends: dict[str, str]) -> 
     """Add rigid stops at the limits of a tendon between two points."""
     for side, bound in (("min", tendon.limits.lower), ("max", tendon.limits.upper)):
         if _limits(builder, tendon) and isfinite(bound) and bound > 0.0:
-            name = builder.names.free("forces", f"{tendon.name}_{side}_stop")
-            builder.scene.add_force("ptp_stop", name, **ends, side=side, l_stop=bound)
+            name = f"{tendon.name}_{side}_stop"
+            builder.add_force("ptp_stop", name, **ends, side=side, l_stop=bound)
 
 
 def _limits(builder: SceneBuilder, tendon: Tendon) -> bool:
@@ -289,8 +283,7 @@ def _limits(builder: SceneBuilder, tendon: Tendon) -> bool:
         return False
     if builder.limits != "off":
         return True
-    text = "limits of tendons, with limits = off"
-    builder.remarks.leave_out(tendon.place, text, motion=True)
+    builder.remarks.leave_out(tendon.place, "limits of tendons, with limits = off", motion=True)
     return False
 
 
@@ -319,17 +312,15 @@ def _add_slider(
     scene.add_body(slider, mass=mass, Jp=(mass,) * 3, r=float_tuple(start * level),
                    r_dot=float_tuple(rate * level) if rate else None)  # fmt: skip
     rail = scene.add_vector(names.free("vectors", f"{slider}_way"), "ground", float_tuple(level))
-    scene.add_joint(
-        "tran", names.free("joints", f"{slider}_rail"), P_i=f"{slider}.O", P_j="ground.O",
-        a_j=rail,
+    builder.add_joint(
+        "tran", f"{slider}_rail", P_i=f"{slider}.O", P_j="ground.O", a_j=rail,
         lower=min(limits.lower - start, 0.0) if limits.lower > 0.0 else None,
         upper=max(limits.upper - start, 0.0) if isfinite(limits.upper) else None,
     )  # fmt: skip
-    name = names.free("joints", f"{tendon.name}_length")
     more = {"points": (*fields["points"], "ground.O", f"{slider}.O"),
             "divisors": (*(tendon.divisors or (1.0,) * len(links))[: len(tendon.points) - 1],
                          0.0, -1.0, 1.0)}  # fmt: skip
-    scene.add_joint("tendon", name, **{**fields, **more})
+    builder.add_joint("tendon", f"{tendon.name}_length", **{**fields, **more})
 
 
 def _level(gravity: Sequence[float]) -> Floats:
@@ -344,12 +335,10 @@ def add_held(builder: SceneBuilder, model: Articulation) -> None:
     for tendon in model.held:
         keyword, fields = line_of(builder, model, tendon) or ("", {})
         if keyword == "ptp":
-            name = builder.names.free("joints", tendon.name)
             ends = dict(zip(("P_i", "P_j"), fields["points"], strict=True))
-            builder.scene.add_joint("sph-sph", name, **ends, length=tendon.rest)
+            builder.add_joint("sph-sph", tendon.name, **ends, length=tendon.rest)
         elif keyword == "tendon":
-            name = builder.names.free("joints", tendon.name)
-            builder.scene.add_joint("tendon", name, **fields, length=tendon.rest)
+            builder.add_joint("tendon", tendon.name, **fields, length=tendon.rest)
         elif keyword and len(fields["movers"]) > 1:
             _hold_sum(builder, model, tendon, fields)
         else:
@@ -392,9 +381,9 @@ def _turn_by_sum(
         rate += speed
         own = (size[0], whole) if count == 1 else size
         add_wheel(builder, wheel, own[0], own[1], speed)
-        builder.scene.add_joint(
-            "follow", names.free("joints", f"{wheel}_follows"), body_i=mover, a_j=axis,
-            a_k=f"{wheel}.z", ratio=scale / coef, along=True if slides else None,
+        builder.add_joint(
+            "follow", f"{wheel}_follows", body_i=mover, a_j=axis, a_k=f"{wheel}.z",
+            ratio=scale / coef, along=True if slides else None,
         )  # fmt: skip
         if k == 1:
             total = wheel
@@ -404,10 +393,8 @@ def _turn_by_sum(
             total = names.free("bodies", f"{tendon.name}_sum{k}")
             own = (size[0], whole) if k == count else size
             add_wheel(builder, total, own[0], own[1], rate)
-        builder.scene.add_joint(
-            "follow", names.free("joints", f"{tendon.name}_sum{k}"), body_i=total,
-            a_j=f"{before}.z", a_k=f"{wheel}.z",
-        )  # fmt: skip
+        builder.add_joint("follow", f"{tendon.name}_sum{k}", body_i=total, a_j=f"{before}.z",
+                          a_k=f"{wheel}.z")  # fmt: skip
 
 
 #: Time constant of stops where the format says no stiffness: of soft ones, and of contact at rest
@@ -426,9 +413,9 @@ def add_ball_forces(builder: SceneBuilder, joint: Joint) -> None:
     ends = named_ends(builder, from_ground(builder, joint))
     k, c = joint.stiffness[0], joint.damping[0]
     rest = quaternion(ends.on_child.A @ ends.on_parent.A.T) if k else None
-    name = builder.names.free("forces", f"{ends.name}_{'spring' if k else 'damper'}")
-    builder.scene.add_force("sph_sd", name, body_i=ends.child, body_j=ends.parent, k=k or None,
-                            c=c or None, p_c=rest)  # fmt: skip
+    name = f"{ends.name}_{'spring' if k else 'damper'}"
+    builder.add_force("sph_sd", name, body_i=ends.child, body_j=ends.parent, k=k or None,
+                      c=c or None, p_c=rest)  # fmt: skip
 
 
 def _add_stop(builder: SceneBuilder, joint: Joint) -> None:
@@ -446,19 +433,14 @@ def _add_stop(builder: SceneBuilder, joint: Joint) -> None:
         text = "limits of a ball are a soft stop, critically damped for the inertia that it sees, "
         text += "of a time constant of 2 ms"
     builder.remarks.translate(joint.place, text, motion=True)
-    name = builder.names.free("forces", f"{ends.name}_stop")
-    builder.scene.add_force("sph_stop", name, body_i=ends.parent, body_j=ends.child,
-                            phi_stop=joint.limits[0].upper,
-                            p_c=quaternion(ends.on_parent.A @ ends.on_child.A.T),
-                            **fields)  # fmt: skip
+    builder.add_force("sph_stop", f"{ends.name}_stop", body_i=ends.parent, body_j=ends.child,
+                      phi_stop=joint.limits[0].upper,
+                      p_c=quaternion(ends.on_parent.A @ ends.on_child.A.T), **fields)  # fmt: skip
 
 
 def add_drag(builder: SceneBuilder, joint: Joint) -> None:
     """Add a damper of a free link: against its velocity at its frame, and its angular velocity."""
     body, frame = builder.attached(joint.child, Frame())
-    point, names = f"{body}.O", builder.names
-    if frame.r.any():
-        point = names.free("points", f"{body}_drag")
-        builder.scene.add_point(point, body, float_tuple(frame.r))
-    builder.scene.add_force("bushing", names.free("forces", f"{body}_drag"), P_i=f"{GROUND}.O",
-                            P_j=point, c=(joint.damping[0],) * 6)  # fmt: skip
+    point = builder.point_at(body, frame.r, f"{body}_drag")
+    builder.add_force("bushing", f"{body}_drag", P_i=f"{GROUND}.O", P_j=point,
+                      c=(joint.damping[0],) * 6)  # fmt: skip

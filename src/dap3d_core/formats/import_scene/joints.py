@@ -46,8 +46,7 @@ class JointEnds:
         self.builder, self.joint, self.scene = builder, joint, builder.scene
         self.child, self.on_child = builder.attached(joint.child, joint.in_child)
         self.parent, self.on_parent = builder.attached(joint.parent, joint.in_parent)
-        names = builder.names
-        self.name = name or names.of("joints", joint.name, joint.place, builder.remarks)
+        self.name = name or builder.names.of("joints", joint.name, joint.place, builder.remarks)
 
     def point(self, end: str, offset: Any = (0.0, 0.0, 0.0), suffix: str = "") -> str:
         """The name of a point at the joint's origin on the child ("i") or the parent ("j").
@@ -114,8 +113,8 @@ def _fixed(ends: JointEnds) -> None:
     axis = ends.vector("j", (0.0, 0.0, 1.0))
     P_i, P_j = ends.point("i"), ends.point("j")
     _add(ends, "tran", P_i=P_i, P_j=P_j, a_j=axis, A_c=_relative(ends))
-    lock = ends.builder.names.free("joints", f"{ends.name}_lock")
-    ends.scene.add_joint("drive-tran", lock, P_i=P_i, P_j=P_j, a_j=axis, length=0.0)
+    lock = f"{ends.name}_lock"
+    ends.builder.add_joint("drive-tran", lock, P_i=P_i, P_j=P_j, a_j=axis, length=0.0)
 
 
 def _relative(ends: JointEnds) -> Any:
@@ -172,9 +171,8 @@ def add_wheel(
     """Add a body that turns about ground's z."""
     builder.scene.add_body(wheel, mass=mass, Jp=(inertia,) * 3,
                            w=(0.0, 0.0, rate) if rate else None)  # fmt: skip
-    bearing = builder.names.free("joints", f"{wheel}_bearing")
-    builder.scene.add_joint("rev", bearing, P_i=f"{wheel}.O", P_j="ground.O",
-                            a_i=f"{wheel}.z", a_j="ground.z")  # fmt: skip
+    builder.add_joint("rev", f"{wheel}_bearing", P_i=f"{wheel}.O", P_j="ground.O",
+                      a_i=f"{wheel}.z", a_j="ground.z")  # fmt: skip
 
 
 def follow(
@@ -184,11 +182,11 @@ def follow(
     ratio, *bends = (*ratios, 0.0, 0.0, 0.0)[:4]
     curve: dict[str, Any] = {"curved": True, "bends": tuple(bends)} if any(bends) else {}
     ends = named_ends(builder, from_ground(builder, joint))
-    name = builder.names.free("joints", f"{ends.name}_{suffix}")
-    builder.scene.add_joint(
-        "follow", name, body_i=ends.child, a_j=ends.vector("j", ends.joint.axes[0], "_axis"),
-        a_k=f"{wheel}.z", ratio=None if ratio == 1.0 else ratio,
-        along=True if joint.kind == "prismatic" else None, **curve,
+    builder.add_joint(
+        "follow", f"{ends.name}_{suffix}", body_i=ends.child,
+        a_j=ends.vector("j", ends.joint.axes[0], "_axis"), a_k=f"{wheel}.z",
+        ratio=None if ratio == 1.0 else ratio, along=True if joint.kind == "prismatic" else None,
+        **curve,
     )  # fmt: skip
 
 

@@ -105,9 +105,6 @@ def _checked(link: Link, remarks: Remarks, balance_inertia: bool) -> Inertial:
     """The inertial of a link.
 
     Principal moments that no body has are replaced by the nearest that one has, or their mean.
-
-    Raises:
-        FormatError: it is impossible.
     """
     inertial = link.inertial or Inertial(0.0)
     scale = float(np.abs(inertial.inertia).max(initial=0.0))

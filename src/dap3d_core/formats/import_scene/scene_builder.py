@@ -118,6 +118,14 @@ class SceneBuilder:
             return f"{body}.O"
         return self.scene.add_point(self.names.free("points", name), body, float_tuple(at))
 
+    def add_force(self, keyword: str, name: str, **fields: Any) -> None:
+        """Add a force of this name, or of the first of NAME_2, ... that is free."""
+        self.scene.add_force(keyword, self.names.free("forces", name), **fields)
+
+    def add_joint(self, keyword: str, name: str, **fields: Any) -> None:
+        """Add a joint; its name as of ``add_force``."""
+        self.scene.add_joint(keyword, self.names.free("joints", name), **fields)
+
     def moves_alone(self, joint: Joint) -> bool:
         """True if a joint's two links are one body, so that it has no effect."""
         return self.member[joint.parent][0] == self.member[joint.child][0]

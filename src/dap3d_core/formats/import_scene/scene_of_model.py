@@ -184,8 +184,7 @@ def _is_base_fixed(model: Articulation, remarks: Remarks, *, free_base: bool) ->
         return model.fixed_base
     moves = any(joint.kind != "fixed" for joint in model.joints.values())
     if not moves and not free_base:
-        text = "no joint of the model moves: its base is free"
-        remarks.translate(model.place, text, motion=True)
+        remarks.translate(model.place, "no joint of the model moves: its base is free", motion=True)
     return moves and not free_base
 
 
@@ -229,8 +228,7 @@ def _add_gravity(builder: SceneBuilder, gravity: Sequence[float]) -> None:
                 body, frame = builder.attached(link.name, Frame(link.inertial.com))
                 force = float_tuple(-link.gravcomp * link.inertial.mass * np.array(gravity))
                 point = builder.point_at(body, frame.r, f"{body}_carried")
-                name = builder.names.free("forces", f"{body}_carried")
-                scene.add_force("f", name, P_i=point, f=force)
+                builder.add_force("f", f"{body}_carried", P_i=point, f=force)
 
 
 def split_planar(model: Articulation, remarks: Remarks) -> Articulation:
@@ -328,8 +326,7 @@ class _JointCoordinate:
                 "v_j": ends.vector("j", across, f"_across{suffix}"),
                 "axis": ends.vector(self._holder(), -axis, f"_back{suffix}"),
             }
-        name = self.builder.names.free("forces", f"{self.name}_{what}")
-        self.builder.scene.add_force(keyword, name, **fields)
+        self.builder.add_force(keyword, f"{self.name}_{what}", **fields)
 
     def _holder(self) -> str:
         """The end that the axis is fixed in: the child, but for the first of a universal joint."""
@@ -390,8 +387,7 @@ class _JointCoordinate:
         if builder.limits != "hard" or not builder.takes_contacts or joint.kind not in SCALAR:
             return False
         q = joint.position[0] if joint.position else 0.0
-        inside = limits.contain(q, AGREE * max(1.0, abs(q)))
-        if joint in builder.inertia.loops or not inside:
+        if joint in builder.inertia.loops or not limits.contain(q, AGREE * max(1.0, abs(q))):
             return False
         fields = builder.scene.joints[self.name].fields
         if isfinite(limits.lower):
@@ -409,9 +405,8 @@ class _JointCoordinate:
         ends, way = self.ends, 1.0 if side == "min" else -1.0
         plane = ends.point("j", bound * self.axis, f"_{side}")
         normal = ends.vector("j", way * self.axis, "" if side == "min" else "_back")
-        name = self.builder.names.free("forces", f"{self.name}_{side}_stop")
-        self.builder.scene.add_force("plane_stop", name, P_i=ends.point("i"), P_j=plane, a_j=normal,
-                                     **fields)  # fmt: skip
+        self.builder.add_force("plane_stop", f"{self.name}_{side}_stop", P_i=ends.point("i"),
+                               P_j=plane, a_j=normal, **fields)  # fmt: skip
 
     def _own_inertia(self) -> float:
         """Mass, or inertia about the axis, of the child alone, where no mass matrix has it."""
@@ -434,14 +429,14 @@ class _JointCoordinate:
             unit = "rad/s" if self.turns else "m/s"
             text = f"dry friction of a joint fades below {fading:g} {unit}: it creeps, and does not"
             builder.remarks.translate(self.joint.place, f"{text} stick", motion=True)
-        name = builder.names.free("forces", f"{self.name}_friction")
+        name = f"{self.name}_friction"
         if self.turns:
             axis = ends.vector(self._holder(), self.axis)
-            builder.scene.add_force("rot_friction", name, body_i=ends.child, body_j=ends.parent,
-                                    axis=axis, n_c=friction, w_tol=fading)  # fmt: skip
+            builder.add_force("rot_friction", name, body_i=ends.child, body_j=ends.parent,
+                              axis=axis, n_c=friction, w_tol=fading)  # fmt: skip
         else:
-            builder.scene.add_force("tran_friction", name, P_i=ends.point("i"), f_c=friction,
-                                    a_j=ends.vector("j", self.axis), v_tol=fading)  # fmt: skip
+            builder.add_force("tran_friction", name, P_i=ends.point("i"), f_c=friction,
+                              a_j=ends.vector("j", self.axis), v_tol=fading)  # fmt: skip
 
 
 def _perpendicular(axis: Floats) -> Floats:

@@ -159,11 +159,7 @@ class SourceFiles:
             raise FormatError(f"{path.name} is no PNG image: {error}", place) from None
 
     def _inside(self, uri: str, place: Place, base: Path, *, missing: bool = False) -> Path:
-        """A path within the folder or a package; with ``missing`` also one that is nowhere.
-
-        Raises:
-            FormatError: it lies elsewhere, or its package is not known.
-        """
+        """A path within the folder or a package; with ``missing`` also one that is nowhere."""
         root, name = self.folder, uri.strip()
         scheme, separator, rest = name.partition("://")
         if separator and scheme in ("package", "model"):
@@ -188,11 +184,7 @@ class SourceFiles:
         raise FormatError(f"{uri!r} lies outside of the folder of the model", place, remedy)
 
     def _package(self, package: str, uri: str, place: Place) -> Path:
-        """The folder of a package: given, or of its name above the file or next to such a folder.
-
-        Raises:
-            FormatError: it is not known.
-        """
+        """The folder of a package: given, or of its name above the file or beside such a folder."""
         if package in self.packages:
             return self.packages[package]
         root = self.folder.resolve()
@@ -210,8 +202,7 @@ class SourceFiles:
         try:
             data = read_regular(path, LARGEST + 1)
         except OSError as error:
-            what = f"{path} cannot be read: {error.strerror or error}"
-            raise FormatError(what, place) from None
+            raise FormatError(f"{path} cannot be read: {error.strerror or error}", place) from None
         if len(data) > LARGEST:
             raise FormatError(f"{path.name} has more than {LARGEST >> 20} MiB", place)
         return data

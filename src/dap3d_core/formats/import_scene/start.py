@@ -144,8 +144,7 @@ class _Start:
         """
         for name in given:
             if self.model.joints[name].kind == "fixed":
-                what = f"rate of {name}: it is fixed"
-                raise FormatError(what, self.model.joints[name].place)
+                raise FormatError(f"rate of {name}: it is fixed", self.model.joints[name].place)
         self.couplings = [one for one in self.couplings if couples(self.model, one)]
         start = {name: (*joint.rate, 0.0)[0] for name, joint in self.model.joints.items()}
         for name, rate in self._followed(start, given, "rate").items():
@@ -178,11 +177,7 @@ class _Start:
         return known
 
     def _refuse(self, leader: str, joint: str, what: str, wanted: float, found: float) -> None:
-        """Refuse a start that contradicts a coupling.
-
-        Raises:
-            FormatError: always.
-        """
+        """Refuse a start that contradicts a coupling."""
         zero = self.model.joints[joint].reference if what == "position" else 0.0
         text = f"{what} of {joint} = {found + zero:g}: it is coupled with {leader}, which puts it "
         place = self.model.joints[joint].place

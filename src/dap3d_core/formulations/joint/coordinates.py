@@ -253,8 +253,7 @@ class TreeCoordinates(Coordinates):
     def report(self, t: float, u: Floats) -> Floats:
         """As of ``Coordinates``; its coordinates are not those of the run, whose turns count."""
         out = super().report(t, u)
-        angles = self.evaluator.model.report_layout["angles"]
-        out[angles] = self.evaluator.counted_angles(t, u)
+        out[self.evaluator.model.report_layout["angles"]] = self.evaluator.counted_angles(t, u)
         return out
 
     @contextmanager

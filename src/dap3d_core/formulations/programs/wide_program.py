@@ -180,11 +180,7 @@ def tree_rates(evaluator: Evaluator, count: int) -> WideRates:
 
 
 def _wide_loops(evaluator: Evaluator, count: int) -> list[Entry]:
-    """The group loops that a right-hand side calls; of others those of one scene.
-
-    Raises:
-        CompileError: one of them decides by a number; names it.
-    """
+    """The group loops that a right-hand side calls; of others those of one scene."""
     loops = list(evaluator.loops.entries)
     for q, (kind, group) in enumerate(evaluator.loop_groups):
         loop = write(group.type_info, kind) if kind in LOOPS else None

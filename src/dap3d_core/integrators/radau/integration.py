@@ -29,7 +29,7 @@ from dap3d_core.integrators.stepping.rounding import SMALLEST_ATOL
 from dap3d_core.kernels.array_types import Integers
 from dap3d_core.kernels.compiler.types import FLOAT, Signature, Tuple
 from dap3d_core.kernels.runtime.cache import table_of
-from dap3d_core.kernels.runtime.function_lists import LOOP_LIST, procedure_signature
+from dap3d_core.kernels.runtime.function_lists import LOOP_LIST
 from dap3d_core.linear.lu import LuPlan, StateNode, make_lu_plan
 from dap3d_core.linear.ordering.ordering import JointNode
 from dap3d_core.model import Model
@@ -270,7 +270,7 @@ class RadauIntegration(Integration):
         """
         given = Tuple((System.type_of(), LOOP_LIST, *self.tangent_kinds))
         kinds = RadauState.type_of(), given
-        tangents = table_of(procedure_signature(*kinds), (self.parts[0],), values_alone=True)
+        tangents = table_of(Signature(kinds), (self.parts[0],), values_alone=True)
         signature = Signature((FLOAT, FLOAT, *kinds), FLOAT)
         return table_of(signature, self.parts[1:]), tangents
 

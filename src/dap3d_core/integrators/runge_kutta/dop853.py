@@ -241,7 +241,6 @@ DOP853 = Tableau(
     a=lower_triangle(*(_row(terms) for terms in _A)),
     e=[_row(_E5), _row(_E3)],
     d=[_row(terms) for terms in _D],
-    dense_order=7,
     exponent=1 / 8,
     beta=0.0,
     factor_min=0.333,

@@ -35,7 +35,6 @@ DOPRI5 = Tableau(
             69997945 / 29380423,
         ]
     ],
-    dense_order=4,
     exponent=1 / 5 - 0.75 * 0.04,
     beta=0.04,
     factor_min=1 / 5,

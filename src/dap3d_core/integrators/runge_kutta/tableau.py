@@ -46,8 +46,6 @@ class Tableau:
     #: (rows, S) weights of the higher terms of dense output; no row: none, so that fixed steps end
     #: at each reporting time.
     d: Floats = field(converter=_read_only, repr=False)
-    #: Order of dense output, 0 where there is none.
-    dense_order: int = 0
     #: The controller divides h by err^exponent / err_old^beta / safety, between the two factors.
     exponent: float = 0.0
     beta: float = 0.0

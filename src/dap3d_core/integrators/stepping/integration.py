@@ -108,7 +108,7 @@ class Integration(Restorable):
     Raises
     ------
     ValueError
-        For times, sizes, tolerances or steps that make no sense.
+        For tolerances or steps that make no sense.
     """
 
     #: Name in messages; whether it chooses its steps by their error.
@@ -157,11 +157,8 @@ class Integration(Restorable):
         self._arguments = (functions, system, loops)
         y = np.array(y0, dtype=np.float64)
         instants = np.array(times, dtype=np.float64)
-        check_state_and_times(y, instants)
         check_control(self, rtol, atol, instants, step=step, first_step=first_step)
         size = y.size - self.unscaled_size
-        error_size = size if error_size is None else error_size
-        check_sizes(error_size, size, buffer_rows)
         rtol, atol = self.error_tolerances(rtol, atol)
         switches = np.asarray(ends, dtype=np.float64).reshape(2, -1)
         count = switches.shape[1]
@@ -185,7 +182,7 @@ class Integration(Restorable):
         work.switch_count = count
         work.sampled_switch_count = int(np.count_nonzero(switches[0] != UNSEEN))
         work.t, work.h, work.fixed_step = instants[0], first_step or 0.0, step or 0.0
-        work.rtol, work.error_size = rtol, error_size
+        work.rtol, work.error_size = rtol, size if error_size is None else error_size
         work.projects, work.calls_accepted = project_on, watched
         work.t_limit = work.step_limit_at_switch = work.longest_step = np.inf
 
@@ -238,15 +235,12 @@ class Integration(Restorable):
         """
         if self.rows_are_full and self.status is Status.RUNNING:
             raise RuntimeError("the row buffer is full: take rows() before advancing")
-        self._call_compiled(budget)
-        return self.status
-
-    def _call_compiled(self, budget: int) -> None:
         if jit_is_on():
             self._advance(budget)
         else:
             with np.errstate(all="ignore"):  # as in compiled code, which tests what matters
                 self._advance(budget)
+        return self.status
 
     def project(self) -> bool:
         """Bring the state onto its constraints; False if that failed."""
@@ -430,24 +424,6 @@ class Integration(Restorable):
         w = self.work
         counts = w.step_count, w.rejected_count, w.rhs_count, w.projection_count, w.report_count
         return StepCounts(*map(int, counts))
-
-
-def check_state_and_times(y: Floats, times: Floats) -> None:
-    """ValueError for states and times that make no sense."""
-    if y.ndim != 1 or not np.isfinite(y).all():
-        raise ValueError("y0 must be one vector of finite numbers")
-    if times.ndim != 1 or times.size == 0 or not np.isfinite(times).all():
-        raise ValueError("times must be one vector of finite numbers, t0 first")
-    if not (times[1:] > times[:-1]).all():
-        raise ValueError("reporting times must increase")
-
-
-def check_sizes(error_size: int, size: int, buffer_rows: int) -> None:
-    """ValueError for more components that steer the step than there are, or no room for a row."""
-    if not 0 <= error_size <= size:
-        raise ValueError(f"error_size is {error_size}, but y has {size} components")
-    if buffer_rows < 1:
-        raise ValueError(f"buffer_rows is {buffer_rows}; at least one row must fit")
 
 
 def check_control(

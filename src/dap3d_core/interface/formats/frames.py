@@ -69,8 +69,7 @@ def euler_angles(angles: Sequence[float], sequence: str = "xyz") -> Floats:
     """
     A = np.eye(3)
     for letter, angle in zip(sequence, angles, strict=True):
-        axis = np.eye(3)["xyz".index(letter.lower())]
-        turn = axis_angle(axis, angle)
+        turn = axis_angle(np.eye(3)["xyz".index(letter.lower())], angle)
         A = A @ turn if letter.islower() else turn @ A
     return A
 

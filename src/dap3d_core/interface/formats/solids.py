@@ -80,11 +80,7 @@ def inertia_of_mesh(
 def _tetrahedra(
     vertices: Floats, triangles: Integers, all_positive: bool
 ) -> tuple[float, Floats, Floats]:
-    """Volume, first and second moments over it, of the tetrahedra of triangles and the origin.
-
-    Raises:
-        ValueError: they enclose no volume.
-    """
+    """Volume, first and second moments over it, of the tetrahedra of triangles and the origin."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     determinants = np.einsum("ij,ij->i", a, np.cross(b, c))
     if all_positive:

@@ -29,18 +29,11 @@ _OUT = Array(FLOAT, 0)
 #: Signature of every group loop (loop_modules.py).
 LOOP = Signature((FLOAT, LoopArrays.type_of(), INT, INT, INT, _OUT, _OUT, _OUT))
 LOOP_LIST = Table(LOOP)
-#: A Python integer as an argument.
-INTEGER = INT
-
-
-def procedure_signature(*arguments: Any) -> Signature:
-    """Signature of a function of these arguments that returns nothing."""
-    return Signature(arguments)
 
 
 def step_signature(system: Any) -> Signature:
     """Signature of a formulation's functions: (t, y, out, system, loops)."""
-    return procedure_signature(FLOAT, VECTOR, VECTOR, system, LOOP_LIST)
+    return Signature((FLOAT, VECTOR, VECTOR, system, LOOP_LIST))
 
 
 def loop_list(loops: Sequence[Callable[..., Any]]) -> Any:

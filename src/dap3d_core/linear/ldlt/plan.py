@@ -435,8 +435,7 @@ def _targets(
     sizes = found.sizes
     for k, (first, last, _) in enumerate(matrix.spans):
         if last - first > 1:  # a panel: all zero, until it gathers its blocks
-            size = matrix.heights[k]
-            add(matrix.place[k], size, starts[last] - starts[first], PRODUCTS, ())
+            add(matrix.place[k], matrix.heights[k], starts[last] - starts[first], PRODUCTS, ())
         for column in range(first, last):
             m = sizes[column]
             is_hub = found.is_hub(column)

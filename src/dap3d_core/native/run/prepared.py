@@ -2,7 +2,6 @@
 
 import os
 from functools import cached_property
-from itertools import pairwise
 from typing import Any, ClassVar
 
 import attrs
@@ -15,22 +14,14 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.jumps.law import JumpLaw
 from dap3d_core.formulations.jumps.rounds import jump
 from dap3d_core.integrators import IMPLICIT, Integration
-from dap3d_core.integrators.adams.integration import AdamsIntegration
-from dap3d_core.integrators.adams.step import advance_adams
 from dap3d_core.integrators.moreau.impulses import put_means
 from dap3d_core.integrators.moreau.integration import MoreauIntegration
-from dap3d_core.integrators.moreau.step import advance as advance_contacts
 from dap3d_core.integrators.plugin_integrators import integrator_named
-from dap3d_core.integrators.radau.integration import RadauIntegration
-from dap3d_core.integrators.radau.step import advance as advance_radau
-from dap3d_core.integrators.runge_kutta.integration import RungeKutta
-from dap3d_core.integrators.runge_kutta.step import advance
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.compiler.types import FLOAT, INT, Array
 from dap3d_core.kernels.compiler.units import Entry, type_of
 from dap3d_core.kernels.runtime.array_struct import Arrays
 from dap3d_core.kernels.runtime.cache import jit_is_on
-from dap3d_core.model.knots import breaks_of
 from dap3d_core.model.state_layout import y_from_u
 from dap3d_core.native.run.image import Image
 from dap3d_core.registry import Registry
@@ -39,12 +30,11 @@ from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.control.held_inputs import HeldInputs
 from dap3d_core.simulation.events.contact_jumps import ContactJumps
 from dap3d_core.simulation.events.uncarried_contact import UncarriedContact
-from dap3d_core.simulation.initial.breakpoints import SEEN
+from dap3d_core.simulation.initial.breakpoints import stops_of
 from dap3d_core.simulation.run_state import Callbacks, jumps_of
 from dap3d_core.simulation.settings import compiled_for, settings_of
 from dap3d_core.simulation.stepwise.stepped_run import HORIZON, OpenRun
-from dap3d_core.study.batch import initial_state
-from dap3d_core.study.batch.compiled_batch import UNIT_METRIC, begin_functions
+from dap3d_core.study.batch.compiled_batch import begin_functions, start_constants
 from dap3d_core.study.batch.driver import MIN_PIVOT
 from dap3d_core.study.batch.initial_state import begin_free
 
@@ -104,28 +94,16 @@ class Advance:
 
     @classmethod
     def of(cls, integration: Integration) -> "Advance":
-        """The loop of an integration.
-
-        Raises:
-            SceneError: its integrator cannot be exported.
-        """
-        function: Any = {
-            RungeKutta: advance, AdamsIntegration: advance_adams,
-            MoreauIntegration: advance_contacts,
-        }.get(type(integration))  # fmt: skip
+        """The loop of an integration."""
         completes = None
         if isinstance(integration, MoreauIntegration):
             integration.make_room()
             means: Any = put_means
             changed = integration.loop_arguments[:2]
             completes = means.compile([*map(type_of, changed), Array(FLOAT, 1)])
-        if isinstance(integration, RadauIntegration):
-            function = advance_radau
-        elif function is None:
-            raise refusal(f"integrator {integration.name} cannot be exported")
+        loop: Any = integration.loop
         given = integration.loop_arguments
-        entry = function.compile([*map(type_of, given), INT])
-        return cls(integration, entry, given, completes)
+        return cls(integration, loop.compile([*map(type_of, given), INT]), given, completes)
 
 
 @attrs.frozen(eq=False)
@@ -234,14 +212,8 @@ class StartCode:
             return None
         if str(settings.correct_metric) != "unit":
             return None
-        unit = UNIT_METRIC.copy()
-        unit[0] = model.length
-        starting = np.zeros(initial_state.STARTING + evaluator.plan.row_size)
-        starting[initial_state.SIZE] = evaluator.model.size
-        without = evaluator.system.row[np.flatnonzero(~model.position_row)]
-        starting[initial_state.STARTING + without] = 1.0
         given = np.concatenate([model.u0, model.initial_states])
-        arrays = StartArrays(given=given, unit=unit, starting=starting)
+        arrays = StartArrays(given=given, **start_constants(evaluator))
         is_corrected = bool(model.joint_row_count and settings.correct)
         assembles = is_corrected and not (formulation.accepts_redundant or has_contacts)
         # pivots beside contacts are not watched (formulations/pivots.py)
@@ -350,14 +322,12 @@ class PreparedRun:
     @cached_property
     def stops(self) -> list[Stop]:
         """Break points of functions of time in runs of any length, and instants between them."""
-        checked, model = self.compiled.checked, self.evaluator.model
-        used = {int(k) for group in model.functions for k in group.members}
-        breaks = sorted({
-            float(t) for k in used for t in breaks_of(checked.functions[k]) if 0.0 < t < HORIZON
-        })  # fmt: skip
-        between = [Stop(a + part * (b - a), False, b) for a, b in pairwise(breaks) for part in SEEN]
-        found = [*(Stop(t, True, t) for t in breaks), *between]
-        return sorted(found, key=lambda stop: (stop.t, stop.jumps))
+        found: list[Stop] = []
+        needs = HORIZON
+        for t, jumps in reversed(stops_of(self.compiled.checked, self.evaluator.model, HORIZON)):
+            needs = t if jumps else needs
+            found.append(Stop(t, jumps, needs))
+        return found[::-1]
 
     @cached_property
     def drives(self) -> bool:

@@ -170,7 +170,6 @@ def estimated_error(u: Floats, finer: Floats, step_count: int) -> Floats:
     np.maximum(found[1:-1], apart[2:], out=found[1:-1])  # the start is known
     np.maximum(found[1:], apart[:-1], out=found[1:])
     rounding = float(np.finfo(float).eps) * np.sqrt(step_count)
-    parts = split(found)
-    for part, size in zip(parts, sizes_of(u).values(), strict=True):
+    for part, size in zip(split(found), sizes_of(u).values(), strict=True):
         np.maximum(part, rounding * size, out=part)
     return found

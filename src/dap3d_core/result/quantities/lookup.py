@@ -77,8 +77,7 @@ def find(result: QuantitySource, name: str) -> Quantity:
                 if coordinate := _coordinate(result, name, owner, attribute):
                     return coordinate
             elif attribute in QUANTITIES[owner.kind]:
-                columns = _components(result, owner, attribute)
-                if not component or component in columns:
+                if not component or component in _components(result, owner, attribute):
                     return _quantity(result, name, owner, attribute, component)
             elif own := own_quantity(result, name, owner, attribute, component):
                 return own
@@ -128,8 +127,7 @@ def _output(result: QuantitySource, name: str) -> Quantity | None:
     if component not in _with_norm(columns):
         return None
     values = _component_of(output.values, columns, component)
-    label = f"{head}, {component}"
-    return output._replace(name=name, values=values, label=label, components=())
+    return output._replace(name=name, values=values, label=f"{head}, {component}", components=())
 
 
 def joint_coordinates(result: QuantitySource) -> Iterator[Quantity]:
@@ -412,9 +410,6 @@ def _contact_quantity(source: QuantitySource, name: str) -> Quantity | None:
 
     Vectors by components or ``norm``; those of a contact with several points are of ``NAME#1``;
     scalars of such a contact have a column for each point.
-
-    Raises:
-        UnknownNameError: the contact has no such quantity.
     """
     head, *rest = name.split(".")
     points = source.summary.contacts.get(head.partition(POINT)[0])

@@ -104,22 +104,17 @@ def coordinates_of(result: "Result") -> "xarray.Dataset":
     coordinates, rates = quantities[::2], quantities[1::2]
     if not coordinates:
         return xarray.Dataset()
-    dimensions = ("time", "coordinate")
-    arrays = {
-        name: np.stack([one.values for one in some], axis=1)
-        for name, some in (("joint_q", coordinates), ("joint_q_dot", rates))
-    }
+    variables: dict[str, Any] = {}
+    for name, some, text in (("joint_q", coordinates, "joint coordinates"),
+                             ("joint_q_dot", rates, "their rates")):  # fmt: skip
+        values = np.stack([one.values for one in some], axis=1)
+        variables[name] = (("time", "coordinate"), values, about("SI", text))
     names, units = np.array([(one.name, one.unit) for one in coordinates], dtype=str).T
-    return xarray.Dataset(
-        {
-            "joint_q": (dimensions, arrays["joint_q"], about("SI", "joint coordinates")),
-            "joint_q_dot": (dimensions, arrays["joint_q_dot"], about("SI", "their rates")),
-        },
-        {
-            "coordinate": ("coordinate", names, about("1", "joint coordinate")),
-            "coordinate_unit": ("coordinate", units, about("1", "unit of the coordinate")),
-        },
-    )
+    labels = {
+        "coordinate": ("coordinate", names, about("1", "joint coordinate")),
+        "coordinate_unit": ("coordinate", units, about("1", "unit of the coordinate")),
+    }
+    return xarray.Dataset(variables, labels)
 
 
 def contacts_of(result: "Result") -> "xarray.Dataset":

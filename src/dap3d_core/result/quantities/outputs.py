@@ -74,11 +74,7 @@ def _components(operands: Mapping[str, Quantity], values: Any) -> tuple[str, ...
 
 
 def _unit(expression: Expression, operands: Mapping[str, Quantity]) -> tuple[str, bool]:
-    """The unit of an expression, as declared or as computed, and whether that is certain.
-
-    Raises:
-        ExpressionError: it adds unlike units, or its value has another unit than is declared.
-    """
+    """The unit of an expression, as declared or as computed, and whether that is certain."""
     units = {
         name: UNKNOWN if one.owner == "input" else unit_of(one.unit, exact=one.exact)
         for name, one in operands.items()

@@ -45,11 +45,8 @@ def dataset_of(result: QuantitySource) -> "xarray.Dataset":
         variables[f"{name}_energy"] = (("time",), values, about(energy.unit, energy.label))
     for constant in CONSTANTS:
         values = getattr(summary, constant.name)
-        variables[constant.name] = (
-            constant.dimensions,
-            values,
-            about(constant.unit, constant.meaning),
-        )
+        text = about(constant.unit, constant.meaning)
+        variables[constant.name] = (constant.dimensions, values, text)
     joint_of_row = np.repeat(np.array(summary.joint_names, dtype=str), summary.joint_rows)
     labels = {
         "body": summary.body_names,

@@ -122,8 +122,7 @@ def _materials(
         name = own or usual or ""
         if name and name not in known and (own or name not in used):
             key = ("shapes", shape.name) if own else ("collisions",)
-            words = missing_words(report, "material", name, known)
-            report.add((*key, "material"), name, *words)
+            report.add((*key, "material"), name, *missing_words(report, "material", name, known))
         index.append(used.setdefault(name, len(used)))
     for name in used.keys() & known.keys():
         if (mu_s := known[name].mu_s) is not None and mu_s != known[name].mu:

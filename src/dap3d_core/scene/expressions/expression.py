@@ -283,11 +283,7 @@ def _apply(word: str, *arguments: Any) -> Any:
 
 
 def _call(word: str, *arguments: Node) -> Node:
-    """A call, or its value where its arguments are numbers.
-
-    Raises:
-        ExpressionError: that value is not finite.
-    """
+    """A call, or its value where its arguments are numbers."""
     numbers = [argument for argument in arguments if isinstance(argument, float)]
     if len(numbers) < len(arguments):
         return Call(word, arguments)

@@ -58,9 +58,6 @@ def _counted(data: bytes) -> tuple[Any, Any]:
     """Vertices and triangles of MuJoCo's own format of meshes.
 
     Four numbers of vertices, normals, texture coordinates and triangles, and then these.
-
-    Raises:
-        ValueError: it has another length, or names other vertices.
     """
     counts = [int(n) for n in np.frombuffer(data, "<i4", 4)]
     ends = np.cumsum([16, *(4 * n * size for n, size in zip(counts, (3, 3, 2, 3), strict=True))])

@@ -73,8 +73,7 @@ def load(source: str | bytes | os.PathLike[str]) -> Scene:
 def _load(source: str | bytes | os.PathLike[str], within: tuple[Path, ...]) -> Scene:
     """A scene that the scenes of other files include, the outermost first."""
     path, notes = _find(source)
-    data = _parse(read_text(path, LARGEST_FILE), path)
-    scene = scene_of(data, path, within)
+    scene = scene_of(_parse(read_text(path, LARGEST_FILE), path), path, within)
     scene.notes += notes
     return scene
 

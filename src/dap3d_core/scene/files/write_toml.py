@@ -116,8 +116,7 @@ def _value(value: Any, place: str) -> str:
         return str(value.isoformat())
     other = plain(value)
     if other is value or type(other) is kind:
-        what = f"a scene file cannot hold {kind.__name__}"
-        raise SceneError([Mistake(place, value, what)])
+        raise SceneError([Mistake(place, value, f"a scene file cannot hold {kind.__name__}")])
     return _value(other, place)
 
 

@@ -102,8 +102,7 @@ def check_settings(
         value = getattr(simulation, name)
         if setting.kind == "bodies" or (value is None and setting.default is None):
             continue
-        reader = _READERS[setting.kind]
-        result = report.read((*key, name), value, partial(reader, setting=setting))
+        result = report.read((*key, name), value, partial(_READERS[setting.kind], setting=setting))
         if not isinstance(result, Fault):
             good[name] = result
     _check_step(report, simulation, good.get("integrator"), (*key, "step"))

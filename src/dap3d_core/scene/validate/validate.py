@@ -53,8 +53,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     materials, others = _read_materials(report), (joints, forces)
     contacts = _read_contacts(report, bodies, geometry, types, functions, others, materials)
     collisions = _check_shapes_and_outputs(report, bodies, joints, materials)
-    left = bool(contacts or collisions)
-    forces = _acting_forces(report, geometry, types, others, left=left)
+    forces = _acting_forces(report, geometry, types, others, left=bool(contacts or collisions))
     check_header(report)
     check_settings(report, scene.simulation, bodies.body_names, ("simulation",))
     report.raise_mistakes()
@@ -94,13 +93,11 @@ def _collector(scene: Scene) -> Collector:
 
 def _check_names(report: Collector) -> None:
     for table in NAMED:
-        names = getattr(report.scene, table)
-        for name in names:
+        for name in getattr(report.scene, table):
             if type(name) is str and name.isidentifier() and name.lower() != "ground":
                 continue  # nearly all names
             if fault := fault_of_name(name):
-                key = (table, str(name))
-                report.add(key, name, f"not a name for one of the {table}: {fault}")
+                report.add((table, str(name)), name, f"not a name for one of the {table}: {fault}")
 
 
 def _read_signals(
@@ -178,8 +175,7 @@ def _read_contacts(
     contacts = (
         read_contacts(report, geometry, types, functions, elements, materials) if elements else []
     )
-    by_name = {joint.name: joint for joint in joints}
-    sticking = read_friction(report, by_name, rubbing)
+    sticking = read_friction(report, {joint.name: joint for joint in joints}, rubbing)
     contacts += [*read_rigid(report, types, rigid), *sticking]
     return with_unit_mass(contacts, bodies.mass)
 
@@ -271,8 +267,7 @@ def _report_twins(report: Collector, **tables: Iterable[Instance]) -> None:
         references = tuple(
             v for v in instance.values.values() if not isinstance(v, (float, type(None)))
         )
-        key = (id(instance.type_info), instance.bodies, references)
-        twin = seen.setdefault(key, instance)
+        twin = seen.setdefault((id(instance.type_info), instance.bodies, references), instance)
         if twin is instance:
             continue
         same = twin.values == instance.values

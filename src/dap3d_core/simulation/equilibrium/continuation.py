@@ -119,9 +119,7 @@ class ParameterStatics:
         self._loaded = np.nan
         self._first: Floats | None = None
         self.load(0.0)
-        places = np.arange(evaluator.system.par.size)
-        counted = [places[place] for place in evaluator.turn_places()]
-        self._counted = np.concatenate([places[:0], *counted])
+        self._counted = np.r_[0:0, *evaluator.turn_places()]
         self.statics = Statics(evaluator)
         n, part = evaluator.model.body_count, self.statics.length
         extent = max(evaluator.model.extent, part)

@@ -142,14 +142,22 @@ class ContactJumps(Jumps):
         slips: Floats = self.table.outputs(integration.t, self._place(integration))[:, PLANE]
         return slips
 
+    def sliding(self) -> list[int]:
+        """As of ``Jumps``."""
+        switches: list[int] = self.table.switches[self._slide(), 1].tolist()
+        return switches
+
     def sliding_from_rest(self, integration: Integration) -> dict[str, int]:
         """As of ``Jumps``."""
         table, speeds = self.table, np.linalg.norm(self.slips(integration), axis=1)
-        slides = (self._evaluator.states[table.mode] == 1.0) & (self.arrays.mu > 0.0)
-        slides &= table.holds[:, 1:].all(axis=1)
-        places = [c for c in np.flatnonzero(slides).tolist()
+        places = [c for c in np.flatnonzero(self._slide()).tolist()
                   if speeds[c] <= still_speed(self.arrays, c)]  # fmt: skip
         return {table.names[c]: c for c in places}
+
+    def _slide(self) -> Any:
+        """(m,) of each contact whether it slides in a plane, against friction."""
+        slides = (self._evaluator.states[self.table.mode] == 1.0) & (self.arrays.mu > 0.0)
+        return slides & self.table.holds[:, 1:].all(axis=1)
 
     def repeat_of(self, other: Jumps) -> None:
         """Decide what another decided at its last instant, at states nearby."""

@@ -86,6 +86,10 @@ class Jumps:
         """(m, 3) slip of each contact, m/s."""
         return np.zeros((0, 3))
 
+    def sliding(self) -> list[int]:
+        """Switches by which slip ends of contacts that slide in a plane, against friction."""
+        return []
+
     def sliding_from_rest(self, integration: Integration) -> dict[str, int]:
         """Name -> place among ``slips`` of contacts that slide, in a plane, and are still."""
         return {}

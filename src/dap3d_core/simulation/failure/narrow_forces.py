@@ -37,50 +37,41 @@ def notes_on_laws(checked: ValidatedScene) -> list[str]:
         for name in called
         if not breaks_are_told(functions[name])
     ]
-    by_type: dict[Any, list[str]] = {}
-    for element in _written(checked):
-        by_type.setdefault(element.type_info.type, []).append(element.name)
-    type_info = {force.type_info.type: force.type_info for force in checked.forces}
-    return [*found, *_branching(by_type, type_info)]
-
-
-def _written(checked: ValidatedScene) -> list[Instance]:
-    """The forces of the scene, without those that joints bring, which move nothing."""
-    return [force for force in checked.forces if "." not in force.name]
+    return found + [
+        information(
+            f"{forces}: its law has branches and its type no switch: steps go across them, and may "
+            "pass over a short one"
+        )
+        for forces in _without_switch(checked, LAWS)
+    ]
 
 
 def notes_on_derivatives(checked: ValidatedScene) -> list[str]:
     """Laws with branches or corners at which no step ends: what derivatives of a run are there."""
-    by_type: dict[Any, list[str]] = {}
-    for element in _written(checked):
-        info = element.type_info
-        if "switch" not in info.kernels and _chooses(info, (*LAWS, *STATES), CORNERS):
-            by_type.setdefault(info.type, []).append(element.name)
     return [
-        f"derivatives: {type_.kind}s.{names[0]}{_more(names)} ({type_.keyword}) has a law with "
-        "branches or corners and no switch: where the motion passes a jump of it, they are wrong "
-        "from there on; at a corner they are good to a part of a thousand or so, whatever the "
-        "tolerance"
-        for type_, names in by_type.items()
+        f"derivatives: {forces} has a law with branches or corners and no switch: where the motion "
+        "passes a jump of it, they are wrong from there on; at a corner they are good to a part of "
+        "a thousand or so, whatever the tolerance"
+        for forces in _without_switch(checked, (*LAWS, *STATES), CORNERS)
     ]
 
 
-def _more(names: list[str]) -> str:
-    return f" and {len(names) - 1} more" if len(names) > 1 else ""
+def _without_switch(
+    checked: ValidatedScene, names: Sequence[str], corners: Sequence[str] = ()
+) -> Iterator[str]:
+    """For each type without a switch whose laws choose between formulas: its forces, in words."""
+    of_types: dict[Any, list[Instance]] = {}
+    for force in checked.forces:
+        if "." not in force.name:  # those that joints bring move nothing
+            of_types.setdefault(force.type_info.type, []).append(force)
+    for type_, (first, *others) in of_types.items():
+        info = first.type_info
+        if "switch" not in info.kernels and _chooses(info, names, corners):
+            more = f" and {len(others)} more" if others else ""
+            yield f"{type_.kind}s.{first.name}{more} ({type_.keyword})"
 
 
-def _branching(by_type: dict[Any, list[str]], type_info: dict[Any, TypeInfo]) -> Iterator[str]:
-    for type_, names in by_type.items():
-        kernels = type_info[type_].kernels
-        if "switch" in kernels or not _chooses(type_info[type_]):
-            continue
-        yield information(
-            f"{type_.kind}s.{names[0]}{_more(names)} ({type_.keyword}): its law has branches "
-            "and its type no switch: steps go across them, and may pass over a short one"
-        )
-
-
-def _chooses(type_info: TypeInfo, names: Sequence[str] = LAWS, corners: Sequence[str] = ()) -> bool:
+def _chooses(type_info: TypeInfo, names: Sequence[str], corners: Sequence[str]) -> bool:
     """True if a law of a type chooses between formulas, or calls one of Python's with a corner."""
     laws = [type_info.kernels[name] for name in names if name in type_info.kernels]
     return any(

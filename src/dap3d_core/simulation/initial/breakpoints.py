@@ -1,6 +1,5 @@
 """Break points of functions of time: instants that no step passes, steps too long for one."""
 
-from collections.abc import Iterable
 from itertools import pairwise
 
 import numpy as np
@@ -9,7 +8,7 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import Model
 from dap3d_core.model.knots import breaks_of
 from dap3d_core.result import information
-from dap3d_core.scene import Instance, Simulation, ValidatedScene
+from dap3d_core.scene import Simulation, ValidatedScene
 
 #: Instants of a run at which functions are looked at, besides those near their breaks.
 SAMPLES = 64
@@ -39,12 +38,11 @@ class Breakpoints:
     def __init__(self, checked: ValidatedScene, evaluator: Evaluator, t_end: float) -> None:
         used = sorted({int(k) for group in evaluator.model.functions for k in group.members})
         functions = {k: checked.functions[k] for k in used}
-        breaks = _breaks_of(functions.values(), t_end)
-        self.stops = _stops(breaks)
+        self.stops = stops_of(checked, evaluator.model, t_end)
         self.t_end = t_end
         self.periods: dict[str, float] = {}
         if functions and t_end > 0.0:
-            instants = _instants(breaks, t_end)
+            instants = _instants([t for t, jumps in self.stops if jumps], t_end)
             values = np.array([evaluator.function_values(t) for t in instants])
             spread, bend = np.ptp(values[:, :, 0], axis=0), np.max(np.abs(values[:, :, 2]), axis=0)
             for k, function in functions.items():
@@ -80,15 +78,8 @@ class Breakpoints:
 
 def stops_of(checked: ValidatedScene, model: Model, t_end: float) -> list[tuple[float, bool]]:
     """``Breakpoints.stops`` alone."""
-    used = sorted({int(k) for group in model.functions for k in group.members})
-    return _stops(_breaks_of([checked.functions[k] for k in used], t_end))
-
-
-def _breaks_of(functions: Iterable[Instance], t_end: float) -> list[float]:
-    return sorted({float(t) for f in functions for t in breaks_of(f) if 0.0 < t < t_end})
-
-
-def _stops(breaks: list[float]) -> list[tuple[float, bool]]:
+    functions = [checked.functions[int(k)] for group in model.functions for k in group.members]
+    breaks = sorted({float(t) for f in functions for t in breaks_of(f) if 0.0 < t < t_end})
     between = [a + part * (b - a) for a, b in pairwise(breaks) for part in SEEN]
     return sorted([*((t, True) for t in breaks), *((t, False) for t in between)])
 

@@ -24,6 +24,7 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.linear.rank.rank import DENSE_ROWS, Rank
 from dap3d_core.model.state_layout import at_rest, split, velocities_of
+from dap3d_core.registry.suggestions import some
 from dap3d_core.simulation.initial.assemble import max_speed
 from dap3d_core.simulation.initial.least_change import (
     displaced,
@@ -54,8 +55,6 @@ OFFSET_ANGLE, FIRST = 0.1, 0.05
 SPAN = 1e-3
 #: Weights of a derivative at the first of five points, times twelve.
 FORWARD = (-25.0, 48.0, -36.0, 16.0, -3.0)
-#: Bodies whose velocities a sentence gives.
-MOST_BODIES = 6
 #: Instants, s, at which functions of time may show.
 LATER = (1e-3, 0.1, 1.0)
 
@@ -257,8 +256,7 @@ class _Cone:
             for name, x in zip(names, v.reshape(-1, 6), strict=True)
             if np.max(np.abs(x)) > SAME
         ]
-        more = len(moving) - MOST_BODIES
-        return "; ".join(moving[:MOST_BODIES]) + (f"; and {more} bodies more" if more > 0 else "")
+        return some(moving, between="; ")
 
     def taken(self, T: Floats, z: Floats, way: Floats, words: str) -> SingularStart:
         """The start that takes a branch (f, b), with accelerations ``free`` + N z.

@@ -15,13 +15,12 @@ from dap3d_core.integrators import Integration
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, NOISE, Y
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import split
+from dap3d_core.registry.suggestions import some
 from dap3d_core.scene import Simulation
 from dap3d_core.scene.validate.settings import QUANTITIES, USUAL_ATOL
 
 #: A motion is resolved that is this many times what a step may be off by.
 RESOLVED = 1e3
-#: Names that a note lists.
-MOST_NAMES = 5
 #: Times beyond are no scale of a motion, s.
 LONGEST = 1e12
 
@@ -113,11 +112,10 @@ def rounding_notes(runs: Sequence[Integration], evaluator: Evaluator) -> list[st
     bodies = [names[k] for k in found if k >= 0]
     if not bodies:
         return []
-    words = ", ".join(bodies[:MOST_NAMES]) + (", ..." if len(bodies) > MOST_NAMES else "")
     return [
-        f"the accuracy of {words} is limited by rounding, not by the tolerances: very different "
-        "inertias, a place far from the origin or a very fast motion do that; smaller tolerances "
-        "change nothing there"
+        f"the accuracy of {some(bodies)} is limited by rounding, not by the tolerances: very "
+        "different inertias, a place far from the origin or a very fast motion do that; smaller "
+        "tolerances change nothing there"
     ]
 
 

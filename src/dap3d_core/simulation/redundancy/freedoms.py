@@ -11,6 +11,7 @@ from dap3d_core.linear.rank.rank import DENSE_ROWS
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import euler_rates
 from dap3d_core.model.state_layout import split
+from dap3d_core.registry.suggestions import some
 from dap3d_core.simulation.initial.least_change import finite_rows
 from dap3d_core.simulation.redundancy.redundancy import rank_of
 
@@ -18,12 +19,12 @@ from dap3d_core.simulation.redundancy.redundancy import rank_of
 NAMED = 1e-6
 #: Coordinates of joints are named that change by more than this part of those of bodies.
 PREFERRED = 1e-3
-#: Bodies and motions that a message gives.
-MOST_BODIES, MOST_MOTIONS = 6, 6
+#: Motions that a message gives.
+MOST_MOTIONS = 6
 
 
-def free_motions(evaluator: Evaluator, t: float, u: Floats) -> Floats:
-    """(6 n, dof) motions in m and rad that the rows allow at a state u (13 n,), each by itself.
+def free_motions(evaluator: Evaluator, u: Floats) -> Floats:
+    """(6 n, dof) motions in m, rad that the rows allow at t = 0 and u (13 n,), each by itself.
 
     Each has one coordinate of size one that the others lack, so that motions of different bodies
     do not mix. None where the scene has more than DENSE_ROWS rows.
@@ -36,7 +37,7 @@ def free_motions(evaluator: Evaluator, t: float, u: Floats) -> Floats:
         return np.zeros((columns, 0))
     from scipy.linalg import qr
 
-    rows = scaled_rows(finite_rows(evaluator, t, u), model.size)[0]
+    rows = scaled_rows(finite_rows(evaluator, 0.0, u), model.size)[0]
     rank = rank_of(evaluator, rows).rank
     free = np.linalg.svd(rows.dense())[2][rank:].T
     if not free.shape[1]:
@@ -85,16 +86,13 @@ def motion_words(model: Model, motion: Floats) -> str:
         if parts:
             words.append((max(shift, turn), f"{name} {' and '.join(parts)}"))
     words.sort(key=lambda pair: -pair[0])
-    more = len(words) - MOST_BODIES
-    return "; ".join(text for _, text in words[:MOST_BODIES]) + (
-        f"; and {more} bodies more" if more > 0 else ""
-    )
+    return some([text for _, text in words], between="; ")
 
 
 def freedoms_left(evaluator: Evaluator, u: Floats, dof: int) -> str:
     """The freedoms at a state at t = 0 as a paragraph, a line for each."""
     model = evaluator.model
-    motions = free_motions(evaluator, 0.0, u).T
+    motions = free_motions(evaluator, u).T
     count = f"{dof} degree{'s' if dof != 1 else ''} of freedom {'are' if dof != 1 else 'is'} left"
     lines = [f"  ({k}) {motion_words(model, motion)}"
              for k, motion in enumerate(motions[:MOST_MOTIONS], start=1)]  # fmt: skip

@@ -313,9 +313,7 @@ class StateLog:
         self._reports: list[Floats] = []
         self._contacts: list[Floats] = []
         self._ended: list[frozenset[str]] = []
-        numbers = np.arange(len(evaluator.system.par))
-        turns = [numbers[place] for place in evaluator.turn_places()]
-        self._turns = np.concatenate(turns) if turns else numbers[:0]
+        self._turns = np.r_[0:0, *evaluator.turn_places()]
         self._inputs = quick_view(inputs.present)
         self._y_end = 1 + len(integration.work.state[Y])
         self._end = self._y_end + len(inputs.values)

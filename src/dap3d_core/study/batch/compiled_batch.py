@@ -17,8 +17,9 @@ from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.runge_kutta.step import advance
 from dap3d_core.integrators.stepping.integration import off_constraints
 from dap3d_core.integrators.stepping.integration_state import Status
+from dap3d_core.kernels.compiler.types import INT, Signature
 from dap3d_core.kernels.runtime.cache import jit_is_on, table_of
-from dap3d_core.kernels.runtime.function_lists import INTEGER, LOOP_LIST, procedure_signature
+from dap3d_core.kernels.runtime.function_lists import LOOP_LIST
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.scene import Simulation
@@ -39,10 +40,8 @@ CALL = 200_000
 #: States of a run, at most, where the ways of projections are sought; right-hand sides between
 #: them, at first.
 MOST_STATES, FIRST_CALLS = 8, 50
-#: Constants of the metric in which displacements are measured in m (Model.length) and rad.
-UNIT_METRIC = np.array([1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0])
 
-_DRIVE = procedure_signature(RungeKuttaState.type_of(), STEPS, System.type_of(), LOOP_LIST, INTEGER)
+_DRIVE = Signature((RungeKuttaState.type_of(), STEPS, System.type_of(), LOOP_LIST, INT))
 
 MakeBatch = Callable[[], "CompiledBatch"]
 
@@ -127,16 +126,10 @@ class CompiledBatch:
             )
 
         self._make, self.integration = make, make()
-        work, unit = self.integration.work, UNIT_METRIC.copy()
-        unit[0] = evaluator.model.length
-        starting = np.zeros(initial_state.STARTING + evaluator.plan.row_size + len(y0))
-        starting[initial_state.SIZE] = self.size
-        without_position = np.flatnonzero(~evaluator.model.position_row)
-        starting[initial_state.STARTING + evaluator.system.row[without_position]] = 1.0
+        work = self.integration.work
         self.constants: dict[str, Any] = {
             "metric": evaluator.system.metric.copy(),
-            "unit": unit,
-            "starting": starting,
+            **start_constants(evaluator, len(y0)),
             "first_real": work.real.copy(),
             "first_integer": work.integer.copy(),
             "first_switches": work.switches.copy(),
@@ -310,6 +303,19 @@ def varied_at(system: System, places: Integers) -> dict[str, Integers]:
             here = (first <= places) & (places < first + array.size)
             found[name], first = places[here] - first, first + array.size
     return found
+
+
+def start_constants(evaluator: Evaluator, room: int = 0) -> dict[str, Floats]:
+    """What compiled code makes a start with: for displacements in m and rad, and for corrections.
+
+    ``unit`` are constants of a metric; ``starting`` are arguments of initial_state.py, with room
+    for as many numbers more.
+    """
+    model, first = evaluator.model, initial_state.STARTING
+    starting = np.zeros(first + evaluator.plan.row_size + room)
+    starting[initial_state.SIZE] = model.size
+    starting[first + evaluator.system.row[np.flatnonzero(~model.position_row)]] = 1.0
+    return {"unit": np.array([model.length, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0]), "starting": starting}
 
 
 @cache

@@ -290,8 +290,7 @@ class LaneBatch:
             **{name: wide.lanes[name][0] for name in ("t", "bound")},
             **{name: wide.lanes[name] for name in ("y", "out", "outcome", "switches")},
         )
-        places = [np.arange(system.par.size)[k] for k in evaluator.turn_places()]
-        kept = np.concatenate([np.zeros(0, dtype=np.int64), *places])
+        kept = np.r_[0:0, *evaluator.turn_places()]
         tree = np.zeros((0, count)) if system.tree is None else wide.matrix(system.tree.constants)
         parts = ("par", "body", "metric", "F", "smallest")
         self._points = LanePoints(

@@ -113,10 +113,9 @@ class ParameterMap:
                   and p.path[2] in ("mass", "Jp")}  # fmt: skip
         self._bodies = np.array(sorted(checked.body_index[b] - 1 for b in bodies), dtype=np.int64)
         system, n = evaluator.system, 1 + self._bodies[:, None]
-        par = np.arange(system.par.size)  # turns are counted from zero at the start of each run
         if any(group.type_info.layout.unknowns for group in evaluator.model.joints):
             raise NotCopiedError  # their unknowns are sought anew for each point
-        counters = np.concatenate([par[:0], *(par[places] for places in evaluator.turn_places())])
+        counters = np.r_[0:0, *evaluator.turn_places()]  # zero at the start of each run
         self._counters = len(counters)
         body = system.par.size + n * BODY_WIDTH
         metric = system.par.size + system.body.size + n * METRIC_WIDTH

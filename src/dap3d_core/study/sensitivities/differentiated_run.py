@@ -2,7 +2,8 @@
 
 import copy
 from collections.abc import Callable, Sequence
-from typing import Self
+from functools import partial
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -14,12 +15,16 @@ from dap3d_core.kernels.runtime.lanes import Differentiation
 from dap3d_core.simulation import SimulationError
 from dap3d_core.simulation.run import Run
 from dap3d_core.study.batch.compiled_batch import arrays_of_numbers
+from dap3d_core.study.sensitivities.ending_slip import EndingSlip
 from dap3d_core.study.sensitivities.neighbours import (
     Neighbours,
     arrays_of,
     floats_of,
     total_derivative,
 )
+
+if TYPE_CHECKING:
+    from dap3d_core.simulation.events.jumps import Jumps
 
 #: Part of a run by which a state lies before the jump of a switch.
 BEFORE_JUMP = 1e-12
@@ -69,6 +74,8 @@ class DifferentiatedRun(Run):
             law = type(self.jumps)
             self.jumps.begin = self._jumping(law.begin)  # type: ignore
             self.jumps.apply = self._jumping(law.apply)  # type: ignore
+            self._ending = EndingSlip(self, self._differentiation)
+            integration.advance = partial(self._ending.advance, integration)  # type: ignore
 
     def _slopes_of(self, array: Floats) -> Floats:
         """(size, p) view of the derivatives of an array of the integration."""
@@ -143,7 +150,9 @@ class DifferentiatedRun(Run):
             given = np.append(work.state[Y], work.t)
             of_time = self._slopes_of(work.real)[work.indices("real")["t"]].copy()
             of_state = self._slopes_of(work.state)[: work.state.shape[1]].copy()
-            if (k := self._jumped_switch()) >= 0:
+            if (k := self._ended_slip(of)) >= 0:
+                of_state, of_time = self._to_end_of_slip(work.t), np.zeros_like(of_time)
+            if k >= 0 or (k := self._jumped_switch()) >= 0:
                 rates = self._rates_before(put, given)
                 late = self._slopes_of_jump(k, put, rates, given, np.vstack([of_state, of_time]))
                 of_state, of_time = of_state + np.outer(rates, late), of_time + late
@@ -173,6 +182,7 @@ class DifferentiatedRun(Run):
             if change is type(of).begin:
                 self._refuse_slip_from_rest(slopes)
             self.instants[float(work.t)] = of_time
+            self._ending.forget()
             self._differentiation.take()
             self._slopes_of(work.state)[: work.state.shape[1]] = slopes
             self._slopes_of(work.real)[work.indices("real")["t"]] = of_time
@@ -197,6 +207,21 @@ class DifferentiatedRun(Run):
                     arrays[name] += offset * system[name][:, j].reshape(array.shape)
 
         return put
+
+    def _ended_slip(self, of: "Jumps") -> int:
+        """The switch of a contact whose slip has come to an end; -1 where there is none."""
+        crossed = self.present.work.switches[CROSSED]
+        return next((k for k in of.sliding() if crossed[k] != 0.0), -1)
+
+    def _to_end_of_slip(self, t: float) -> Floats:
+        """(n, p) derivatives of the state at time t; those of waiting rows are put right."""
+        work = self.present.work
+        slopes, rows = self._ending.slopes(t)
+        of_rows, width = self._differentiation.slopes(work.rows), work.rows.shape[1]
+        for k in range(int(work.row_count)):
+            if (found := rows.get(float(work.rows[k, 0]))) is not None:
+                of_rows[k * width : (k + 1) * width] = found
+        return slopes[:, : len(self.neighbours)]
 
     def _jumped_switch(self) -> int:
         """The switch that has jumped as it was crossed; -1 where none has."""

@@ -283,18 +283,8 @@ def directions_of(count: int) -> tuple[int, int]:
 def _notes(
     compiled: CompiledModel, runs: "Sequence[DifferentiatedRun]", result: Result
 ) -> list[str]:
-    """Notes on laws, on slip that ended, and on uncorrected starts that leave their constraints."""
+    """Notes on laws, and on uncorrected starts that leave their constraints."""
     notes = notes_on_derivatives(compiled.checked)
-    contacts = {contact.name.partition("#")[0] for contact in compiled.checked.contacts}
-    stuck = {
-        e.name for e in result.events if e.kind == "stick" and e.name.partition("#")[0] in contacts
-    }
-    if stuck:
-        notes.append(
-            f"derivatives: slip of {some(sorted(stuck))} came to an end; where it had turned, "
-            "they are good to a few parts of a thousand behind that, with rtol = 1e-12 to more "
-            "than 1e-7, and by adams not even so"
-        )
     found = [
         beside.parameter.name for run in runs for beside in run.neighbours if beside.is_brought_back
     ]

@@ -103,11 +103,14 @@ def run_on(
         retries: of a task that raised an exception.
 
     Raises:
-        SceneError: ``client`` is no client, ``chunk`` no number of points.
+        SceneError: ``client`` is no client.
         ClusterError: the cluster has no workers, or some of them lack what the study needs or have
             other versions: each is named with the remedy, and no point is run.
     """
-    _check_arguments(client, chunk)
+    if not isinstance(client, _distributed().Client) or client.asynchronous:
+        what = "a distributed.Client that is not asynchronous"
+        remedy = 'Client("tcp://node7:8786")'
+        raise SceneError([Mistake("client", client, what, remedy=remedy)])
     study = with_absolute_path(study)
     here = environment_of(study)
     if here["fault"]:
@@ -348,19 +351,6 @@ def _requests(client: Any) -> Iterator[None]:
 
 def _gone(client: Any) -> ClusterError:
     return ClusterError(f"the scheduler at {_address(client)} is gone")
-
-
-def _check_arguments(client: Any, chunk: Any) -> None:
-    mistakes = []
-    distributed = _distributed()
-    if not isinstance(client, distributed.Client) or client.asynchronous:
-        what = "a distributed.Client that is not asynchronous"
-        mistakes.append(Mistake("client", client, what, remedy='Client("tcp://node7:8786")'))
-    if chunk is not None and (type(chunk) is not int or chunk < 1):
-        what = "a whole number of points from 1, or None for about a second a task"
-        mistakes.append(Mistake("chunk", chunk, what))
-    if mistakes:
-        raise SceneError(mistakes)
 
 
 def _pickled(study: Study, here: Environment) -> bytes:

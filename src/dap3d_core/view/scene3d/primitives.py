@@ -135,8 +135,7 @@ def spring(slenderness: float) -> Triangles:
     Args:
         slenderness: its length over its radius as it will be drawn, so that its wire is round.
     """
-    steps = ACROSS * TURNS * 2
-    share = np.linspace(0.0, 1.0, steps + 1)
+    share = np.linspace(0.0, 1.0, ACROSS * TURNS * 2 + 1)
     angle, out = 2.0 * np.pi * TURNS * share, np.minimum(1.0, 4.0 * np.minimum(share, 1.0 - share))
     z = END - 0.5 + (1.0 - 2.0 * END) * share
     coil = np.column_stack([out * np.cos(angle), out * np.sin(angle), z * slenderness])

@@ -82,8 +82,7 @@ def scene_geometry(result: Result, scene: Scene, elements: Elements) -> SceneGeo
     named = [scene.bodies[name].color for name in summary.body_names]
     hues = colors(named, [joint.moving for joint in elements.joints])
     shapes = scene_shapes(scene, summary.body_names, hues, elements.surfaces)
-    every = [*elements.joints, *elements.contacts, *elements.forces]
-    points = attachment_points(summary, every)
+    points = attachment_points(summary, [*elements.joints, *elements.contacts, *elements.forces])
     bodies = range(1, summary.body_count + 1)
     bounds = [(k, ORIGIN) for k in bodies] + shapes.corners
     bounds += [(k, at) for k, on_body in enumerate(points) for at in on_body]
@@ -286,8 +285,7 @@ class Drawer:
         """
         if not (one.symbol or one.points or one.vectors):
             return []
-        symbol = one.symbol or ("spring" if one.has_ends else "")
-        return self._draw(one, symbol, "forces", FORCE)
+        return self._draw(one, one.symbol or ("spring" if one.has_ends else ""), "forces", FORCE)
 
     def _draw(self, one: ElementGeometry, symbol: str, layer: str, color: str) -> list[Mark | Span]:
         pieces = DRAWINGS[symbol](self, one)

@@ -287,11 +287,6 @@ def test_singularity_ends_at_the_step_floor(name):
         ("dop853", {"first_step": np.nan}, "first_step is nan"),
         ("dop853", {"rtol": 0.0, "atol": 0.0}, "not both zero"),
         ("dop853", {"rtol": np.nan}, "rtol is nan"),
-        ("dop853", {"error_size": 3}, "y has 2 components"),
-        ("dop853", {"buffer_rows": 0}, "at least one row"),
-        ("dop853", {"times": [0.0, 1.0, 1.0]}, "must increase"),
-        ("dop853", {"times": []}, "t0 first"),
-        ("dop853", {"y0": [np.inf, 0.0]}, "finite numbers"),
     ],
 )
 def test_what_makes_no_sense_is_refused(name, options, words):

@@ -164,7 +164,7 @@ def test_threads_may_ask_for_one_function_at_once(tmp_path, alone):
 
 RUN = """
 import dap3d_core as dap
-r = dap.simulate("pen1", t_end=0.02, dt=0.01)
+r = dap.simulate("bodies2", t_end=0.02, dt=0.01)
 print(r.u.tobytes().hex()[:400])
 """
 

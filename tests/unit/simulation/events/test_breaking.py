@@ -136,6 +136,7 @@ def test_a_joint_that_carries_too_much_from_the_start_breaks_at_once():
     assert result.r[-1, 0] == pytest.approx([L, 0.0, -0.125 * g], abs=1e-12)
 
 
+@long_in_plain_python
 def test_the_link_of_a_chain_that_carries_most_breaks():
     """Of two links under a load that grows, the lower one; the upper one then carries its body."""
     scene = dap.Scene(name="chain")
@@ -158,6 +159,7 @@ def test_the_link_of_a_chain_that_carries_most_breaks():
     assert result.r[-1, 1, 2] == pytest.approx(-2.0 - down, abs=1e-9)
 
 
+@long_in_plain_python
 def test_joints_that_share_their_load_break_one_after_the_other():
     """Each carries 14.715 N at first; a note says that this is a choice."""
     scene = dap.Scene(name="beam")
@@ -255,6 +257,7 @@ def test_joints_end_in_a_run_step_by_step(compiled, settings):
         assert [event.name for event in result.events] == ["rod"]
 
 
+@long_in_plain_python
 def test_only_joints_that_may_break_are_released(compiled):
     event = dap.Event("t", above=0.1, action=lambda state: state.release("hinge"))
     with pytest.raises(ValueError, match="'hinge' is no joint that may be released: there are rod"):

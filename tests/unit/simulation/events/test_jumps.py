@@ -62,7 +62,8 @@ def test_a_ball_bounces_with_its_coefficient_of_restitution(settings):
     assert len(result.t) == 101
 
 
-@pytest.mark.parametrize("moving", [1, pytest.param(2, marks=long_in_plain_python)])
+@long_in_plain_python
+@pytest.mark.parametrize("moving", [1, 2])
 def test_as_many_balls_leave_a_cradle_as_hit_it(moving):
     """Balls of 0.5 m at 2 m/s, 0.3 m before three at rest that touch: at 0.15 s, all at once."""
     scene = dap.Scene(name="cradle")

@@ -54,6 +54,7 @@ def test_a_force_element_takes_the_place_of_a_driver(scene, motion):
     assert np.max(np.abs(result.force("torque").on["i"].moment[:, 1] - moment)) < 1e-9
 
 
+@long_in_plain_python
 def test_an_actuator_whose_input_is_zero_moves_nothing(scene, motion):
     """A note says so, and no more that the actuation is redundant; with a value it is one."""
     free = undriven(scene)

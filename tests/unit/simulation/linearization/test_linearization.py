@@ -99,6 +99,7 @@ def test_outputs_that_read_inputs():
         dap.linearize(scene, inputs=("spring",), outputs=("energy.total",))
 
 
+@long_in_plain_python
 def test_state_space_follows_the_motion():
     """After a small kick the simulated motion is that of z_dot = A z."""
     kick = 1e-5
@@ -216,6 +217,7 @@ def test_state_at_a_switch():
     assert dap.linearize(scene).dof == 6
 
 
+@long_in_plain_python
 def test_control():
     """python-control gets the same matrices and names."""
     lin = dap.linearize(cart(), inputs=("push.f.x",), outputs=("cart.r.x", "bob.r.x"))

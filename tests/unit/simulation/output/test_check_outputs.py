@@ -7,6 +7,7 @@ room for the slowest integrator.
 import numpy as np
 import pytest
 from scipy.special import ellipk, ellipkinc
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 
@@ -74,6 +75,7 @@ def test_a_clutch_brings_two_wheels_to_a_common_speed(integrator):
     assert result.ledger["energy"].ok
 
 
+@long_in_plain_python
 def test_a_clutch_follows_an_input_and_the_model_starts_anew(tmp_path):
     compiled = dap.compile(clutch("on - 0.5"))
 
@@ -131,6 +133,7 @@ def test_a_joint_that_breaks_stays_broken():
     assert result.r[-1, 0, 0] == pytest.approx(1.0 + 0.5 * 10.0 / 3.0 * 2.0 / 3.0, abs=1e-9)
 
 
+@long_in_plain_python
 def test_one_joint_takes_over_from_another():
     """At one instant: what ends does so before the other holds, so the swing keeps its rate."""
     scene = swing("t < 0.2")
@@ -168,6 +171,7 @@ def test_what_changes_back_as_the_joint_ends_is_refused():
         dap.simulate(swing("bob.rdd.z < -9"), t_end=1.0)
 
 
+@long_in_plain_python
 def test_a_script_leaves_joints_alone_that_are_active_by_an_expression():
     event = dap.Event("t", above=0.1, action=lambda state: state.release("rod"))
     with pytest.raises(ValueError, match=r"joint rod is active by 'bob\.r\.x > far'"):

@@ -41,6 +41,7 @@ def singly(of, points):
     return {name: np.array(values) for name, values in found.items()}
 
 
+@long_in_plain_python
 @pytest.mark.parametrize(
     ("name", "method"), [("bodies.b3.mass", "joint"), ("points.out3.sPp.x", "standard")]
 )

@@ -71,6 +71,7 @@ def test_whatever_the_library_raises_is_one_sentence(good, tmp_path, monkeypatch
 
     old = written(tmp_path / "a.nc.part", good.read_bytes()[:-SIZE])
     monkeypatch.setattr(netCDF4, "Dataset", opened)
+    monkeypatch.setattr("dap3d_core.study.sweep.dataset.PATIENCE", 0.05)  # for one that grows
     words = r"is damaged, cut off .*\(NetCDF: Can't open HDF5 attribute\)"
     for read in (dap.open_sweep, dap.open):
         with pytest.raises(ResultError, match=words):
@@ -88,6 +89,7 @@ def test_a_sealed_part_gets_its_name(good, tmp_path):
     assert dap.open_sweep(tmp_path / "a.nc").identical(found)
 
 
+@long_in_plain_python
 def test_what_a_reader_hindered_is_soon_written(tmp_path, monkeypatch):
     """Not only when it would be due again: few readers keep a file for long."""
     fcntl = pytest.importorskip("fcntl")

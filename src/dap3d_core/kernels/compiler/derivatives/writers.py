@@ -95,7 +95,8 @@ class BesideWriter(Instructions):
             self._insert(name, *found.groups())
         elif found := _RETURNED.fullmatch(text):
             one = self.new(f"insertvalue {self._pair} undef, double {found[1]}, 0")
-            two = self._with_slopes_of(found[1], one, "1")
+            slopes = f"{self.vector} {self._zero_or(found[1])}"
+            two = self.new(f"insertvalue {self._pair} {one}, {slopes}, 1")
             self.out.append(f"  ret {self._pair} {two}")
         elif text.startswith("  ret "):
             self.out.append(DOUBLE.sub(self._pair, line))
@@ -199,12 +200,6 @@ class BesideWriter(Instructions):
 
     def _group(self, type_: str) -> str:
         return DOUBLE.sub(self._pair, type_)
-
-    def _with_slopes_of(self, word: str, group: str, place: str) -> str:
-        type_ = self._pair
-        return self.new(
-            f"insertvalue {type_} {group}, {self.vector} {self._zero_or(word)}, {place}"
-        )
 
     def _extract(self, name: str, type_: str, group: str, k: str) -> None:
         of = f"extractvalue {self._group(type_)} {group}, {k}"

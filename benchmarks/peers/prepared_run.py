@@ -11,7 +11,6 @@ from dap3d_core.integrators.runge_kutta.integration import RungeKutta
 from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.integration_state import FINISHED, Y
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.kernels.runtime.cache import jit_is_on
 
 #: Right-hand sides of one call: all.
 ALL = 10**15
@@ -45,7 +44,7 @@ class PreparedRun:
         #: Views of the arrays, which are copied in half the time of arrays, and of their copies.
         self._views = [(array.data, array.copy().data) for array in arrays]
         self._integers, self._status = work.integer.data, type(work).indices("integer")["status"]
-        self._call: Any = integration.prepared() if jit_is_on() else integration._call_compiled
+        self._call: Any = integration.prepared()
 
     def run(self, y0: Floats | None = None) -> bool:
         """Run from a state y0 (n,), by default that of the integration; True if it was finished.
