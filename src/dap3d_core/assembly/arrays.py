@@ -67,9 +67,7 @@ class KeptRowArrays(Arrays):
     solution: Floats  # (m,) scratch
     multipliers: Floats  # (m,) lambda
     smallest: Floats  # (m,) a pivot not above this is near a singular pose
-    settings: (
-        Floats  # (1,) part of a row's square that is its compliance; 0.0: rows are independent
-    )
+    settings: Floats  # (2,) as of formulations/joint_loops/layout.py
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)

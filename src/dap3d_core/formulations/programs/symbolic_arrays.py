@@ -17,6 +17,7 @@ from dap3d_core.assembly.arrays import (
 from dap3d_core.assembly.metric import METRIC_CONSTANTS
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.joint import node_layout as node
+from dap3d_core.formulations.joint_loops.layout import PART_OF_ROW
 from dap3d_core.kernels.compiler.straight_line import Item, StraightLine
 from dap3d_core.kernels.compiler.types import FLOAT, Array, Struct
 from dap3d_core.kernels.compiler.units import address_of
@@ -65,8 +66,9 @@ def _constants(evaluator: Evaluator, of_start: bool) -> Iterator[tuple[str, Inte
         yield "tree.constants", np.arange(system.tree.constants.size)
         yield "tree.work", np.arange(node.WORK_WIDTH)  # of ground, which does not move
         if system.tree.kept is not None:
-            for name in ("settings", *(("smallest",) if of_start else ())):
-                yield f"tree.kept.{name}", np.arange(getattr(system.tree.kept, name).size)
+            yield "tree.kept.settings", np.array([PART_OF_ROW])
+            if of_start:
+                yield "tree.kept.smallest", np.arange(system.tree.kept.smallest.size)
 
 
 def _of_rows(array: Floats, columns: slice) -> Integers:

@@ -33,6 +33,7 @@ from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.interface.contacts.rows import APART
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import velocities_of
+from dap3d_core.registry.suggestions import some
 from dap3d_core.result import EventRecord
 from dap3d_core.result.note import information
 from dap3d_core.scene import Mistake, SceneError
@@ -93,6 +94,8 @@ class ContactJumps(Jumps):
         self._latest: deque[tuple[float, str]] = deque(maxlen=MOST_CHANGES)
         #: largest energy, J, that Newton's law has given in an instant; the instant, and contacts
         self._gain: tuple[float, float, str] = (0.0, 0.0, "")
+        #: Names of contacts that slid with unlike friction and shared what they carry.
+        self._sharing: set[str] = set()
 
     @cached_property
     def arrays(self) -> ContactArrays:
@@ -254,6 +257,13 @@ class ContactJumps(Jumps):
                 "Newton's law does so beside friction and beside other laws or e; "
                 'law = "poisson" of all that strikes at once does not'
             )
+        if self._sharing:
+            found.append(
+                f"contacts {some(sorted(self._sharing))} share what they carry, which bodies leave "
+                "open, and slid with unlike friction: the motion depends on how they share it, "
+                "here so that all are as far inside their cones as can be; give them one mu, or "
+                "let three points touch"
+            )
         if self.count > MOST_RECORDS:
             words = f"contacts changed {self.count} times; the first {MOST_RECORDS} changes are"
             found.append(information(f"{words} kept"))
@@ -345,6 +355,9 @@ class ContactJumps(Jumps):
         if work > max(LOSSLESS * s.exchanged, self._gain[0]) and np.any(s.newton[struck]):
             self._gain = (work, t, ", ".join(table.names[c] for c in struck))
         self._take_decided(integration, work)
+        share = s.near.any(axis=1)
+        if np.unique(s.mu[share]).size > 1 and self._slide()[share].any():
+            self._sharing |= {table.names[c] for c in np.flatnonzero(share)}
         after, works = self._after(u), s.work.copy()
         resisting = np.flatnonzero(table.under >= 0)
         np.add.at(works, table.under[resisting], s.work[resisting])

@@ -393,3 +393,17 @@ def test_a_box_that_falls_flat_sticks_where_it_lands():
     assert max(event.t for event in result.events) == lands
     assert sorted(result.contact("floor").mode[-1]) == [0, 0, 0, 0, 2, 2, 2, 2]
     assert np.max(np.abs(result.rd[-1])) < 1e-14  # it does not creep
+
+
+@pytest.mark.parametrize(("mu", "told"), [(0.2, False), (0.3, True)])
+def test_unlike_friction_of_contacts_that_share_a_load_is_noted(mu, told):
+    """Four feet, of which three would do: how they share the weight decides how it turns."""
+    scene = dap.Scene(name="table")
+    scene.add_body("top", mass=2.0, Jp=(0.1, 0.1, 0.2), r_dot=(1.0, 0.0, 0.0))
+    scene.add_force("weight", "gravity")
+    for k, (x, y) in enumerate([(0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2)]):
+        scene.add_point(f"foot{k}", "top", (x, y, 0.0))
+        given = mu if k == 0 else 0.2
+        scene.add_contact("ball_plane", f"c{k}", P_i=f"foot{k}", mu=given)
+    notes = dap.simulate(scene, t_end=0.01, dt=0.01).notes
+    assert any("c0, c1, c2, c3 share what they carry" in note for note in notes) == told
