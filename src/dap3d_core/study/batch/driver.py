@@ -10,7 +10,6 @@ from typing import Any
 import attrs
 
 from dap3d_core.assembly.arrays import UNSETTLED, System
-from dap3d_core.assembly.evaluate import copy
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.stepping.integration_state import FINISHED, NOISE, RUNNING, Y
 from dap3d_core.kernels.runtime.array_struct import Arrays, Matrix
@@ -53,6 +52,13 @@ class Points(Arrays):
 
 
 @compiled
+def copy_into(target: Any, source: Any) -> None:
+    """Copy a vector."""
+    for k in range(source.shape[0]):
+        target[k] = source[k]
+
+
+@compiled
 def set_numbers(points: Points, p: int, system: System) -> None:
     """Copy the numbers of point p into the arrays of the system."""
     places, par, body, metric = points.places, system.par, system.body, system.metric
@@ -76,15 +82,15 @@ def set_numbers(points: Points, p: int, system: System) -> None:
 @compiled
 def reset_work(points: Points, p: int, work: RungeKuttaState) -> None:
     """Reset the work to that before a run, with the state of point p."""
-    copy(work.real, points.first_real)
-    copy(work.integer, points.first_integer)
+    copy_into(work.real, points.first_real)
+    copy_into(work.integer, points.first_integer)
     for k in range(work.switches.shape[0]):
-        copy(work.switches[k], points.first_switches[k])
+        copy_into(work.switches[k], points.first_switches[k])
     for k in range(work.lengths.shape[0]):
-        copy(work.lengths[k], points.first_lengths[k])
+        copy_into(work.lengths[k], points.first_lengths[k])
     for i in range(work.tolerance.shape[1]):
         work.tolerance[NOISE, i] = 0.0
-    copy(work.state[Y], points.y0[p])
+    copy_into(work.state[Y], points.y0[p])
 
 
 @compiled
@@ -98,15 +104,15 @@ def start(
     t, y = work.t, work.state[Y]
     if points.at[START] != 0:
         for b in range(1, metric.shape[0]):
-            copy(metric[b], points.unit)
+            copy_into(metric[b], points.unit)
         starting[1](t, y, points.starting, system, loops)
-        copy(diagnostics[:STARTING], points.starting[:STARTING])
+        copy_into(diagnostics[:STARTING], points.starting[:STARTING])
         for b in range(1, metric.shape[0]):
-            copy(metric[b], points.metric[b])
+            copy_into(metric[b], points.metric[b])
         set_numbers(points, p, system)
         if diagnostics[OPEN] != 0.0 or not diagnostics[LEAST_PIVOT] > MIN_PIVOT:
             return False
-        copy(points.y0[p], y)
+        copy_into(points.y0[p], y)
     starting[0](t, y, diagnostics, system, loops)
     return True
 
@@ -119,7 +125,7 @@ def store_row(
     end, length = 1 + work.state.shape[1], target.shape[0]
     target[0] = row[0]
     starting[2](row[0], row[1:end], target[1:], system, loops)
-    copy(target[length - row.shape[0] + end :], row[end:])
+    copy_into(target[length - row.shape[0] + end :], row[end:])
 
 
 @compiled
@@ -130,7 +136,7 @@ def store_run(
     diagnostics, nt = points.diagnostics, work.rows.shape[0]
     for k in range(work.row_count):
         if points.at[OWN] == 0:
-            copy(points.rows[p * nt + k], work.rows[k])
+            copy_into(points.rows[p * nt + k], work.rows[k])
         else:
             store_row(points.rows[p * nt + k], work.rows[k], work, starting, system, loops)
     diagnostics[p, ENDED], diagnostics[p, ROWS] = work.status, work.row_count

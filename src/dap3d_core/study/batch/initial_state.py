@@ -21,7 +21,7 @@ from dap3d_core.assembly.arrays import (
     System,
     velocity_offset,
 )
-from dap3d_core.assembly.evaluate import call_kinds, copy, place, place_bodies
+from dap3d_core.assembly.evaluate import call_kinds, place, place_bodies
 from dap3d_core.assembly.state_update import apply_displacement, apply_velocity_change
 from dap3d_core.assembly.turns import begin_turns
 from dap3d_core.formulations.common.constraints import (
@@ -165,7 +165,7 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
         out[PASSES] += 1.0
     if is_differentiated() and worst < 1e100:  # derivatives of a start that values leave as it is
         kept = out[STARTING + system.multipliers.shape[0] :]
-        copy(kept, y)
+        keep(kept, y)
         correct_positions(t, y, out, system, loops)
         put_back(y, kept)
         place(t, y, system, loops)
@@ -178,7 +178,7 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
         place_bodies(y, system.body, system.metric)
     elif is_differentiated():
         kept = out[STARTING + system.multipliers.shape[0] :]
-        copy(kept, y)
+        keep(kept, y)
         correct_velocities(y, system)
         put_back(y, kept)
         place_bodies(y, system.body, system.metric)
@@ -201,6 +201,13 @@ def correct_velocities(y: Floats, system: System) -> None:
     """Correct the velocities of a start by ``residual``."""
     correct(system)
     apply_velocity_change(y, system.metric, system.change)
+
+
+@compiled_into
+def keep(kept: Floats, y: Floats) -> None:
+    """Keep a state."""
+    for k in range(y.shape[0]):
+        kept[k] = y[k]
 
 
 @compiled_into
