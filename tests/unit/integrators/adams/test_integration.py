@@ -190,7 +190,7 @@ def test_a_failed_projection_ends_the_run():
 
 @pytest.mark.parametrize(
     "options",
-    [{"step": 0.1}, {"rtol": -1.0}, {"first_step": 0.0}, {"buffer_rows": 0}, {"error_size": 9}],
+    [{"step": 0.1}, {"rtol": -1.0}, {"first_step": 0.0}],
 )
 def test_settings_that_make_no_sense_are_refused(options):
     with pytest.raises(ValueError, match=next(iter(options))):
