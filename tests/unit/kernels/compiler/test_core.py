@@ -74,6 +74,10 @@ struck = pendulum()
 struck.add_force("plane_stop", "stop", P_i="bob.O", P_j="ground.O", a_j="ground.z", k=1e4, e=0.5)
 for method in ("standard", "lsq"):
     recorder.record(dap.simulate, struck, t_end=0.02, dt=0.02, method=method)
+from support.redundant import hinged_door
+door = hinged_door()
+door.bodies["door"].Jp = (4.0, 1e-9, 4.0)
+recorder.record(dap.simulate, door, t_end=1e-4, dt=1e-4, method="lsq")
 """
 #: For a release: the same functions with other numbers.
 OTHERS = """
