@@ -10,7 +10,7 @@ solved by the block LDL^T of linear/ldlt/factor.py. Needs independent rows.
 
 from typing import Any
 
-from dap3d_core.assembly.arrays import EVEN, LENGTH, SINGULAR, WEAK, Floats, System
+from dap3d_core.assembly.arrays import EVEN, LENGTH, SINGULAR, Floats, System
 from dap3d_core.assembly.evaluate import copy, global_accelerations, rates, state_rates
 from dap3d_core.formulations import regularised
 from dap3d_core.formulations.common import constraints
@@ -77,11 +77,11 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """dy/dt of a state, the power of forces and drivers last.
 
     Where masses differ much, a light body between heavy ones has reactions whose last digits are
-    no rounding of its acceleration any more, but noise that no step can follow. So has a needle.
+    no rounding of its acceleration any more, but noise that no step can follow.
     """
     power = solve_equations(t, y, system, loops, None, solve)
     state_rates(t, out, system, loops)
-    if system.settings[EVEN] != 0.0 or system.settings[WEAK] != 0.0:
+    if system.settings[EVEN] != 0.0:
         power += settle_rows(system)
     rates(y, system.metric, system.acceleration, out)
     out[out.shape[0] - 1] = power
