@@ -181,11 +181,18 @@ def test_column_buckles():
 
 
 @pytest.mark.slow
-def test_column_that_is_pushed_follows_one_path():
-    """k theta = P L sin(theta) + F L cos(theta), without turning points and branches."""
-    found = dap.equilibrium_path(column(push=0.5), "parameters.P", "0:120:4")
+@pytest.mark.parametrize(
+    ("push", "values"), [(0.5, "0:120:4"), (0.01, "0:120:3"), (1e-3, "0:60:2")]
+)
+def test_column_that_is_pushed_follows_one_path(push, values):
+    """k theta = P L sin(theta) + F L cos(theta), without turning points and branches.
+
+    By little it bends near P = k / L alone, past which long steps came to the straight path.
+    """
+    found = dap.equilibrium_path(column(push), "parameters.P", values)
     theta, P = found.of("hinge.angle"), found.values
-    np.testing.assert_allclose(100.0 * theta, 2.0 * P * np.sin(theta) + np.cos(theta), atol=1e-10)
+    moment = 2.0 * P * np.sin(theta) + 2.0 * push * np.cos(theta)
+    np.testing.assert_allclose(100.0 * theta, moment, atol=1e-10)
     assert found.stable.all()
     assert not (found.turning | found.branching).any()
 

@@ -349,6 +349,8 @@ class Continuation:
         elif a.negative_count != b.negative_count:
             k = min(a.negative_count, b.negative_count)
             branching = self._located(a, b, Kind.BRANCHING, lambda point: point.stiffness[k])
+            if branching is None and self._length(a, b) > CORNER:  # b may be of another path
+                return None
             if branching is not None and abs(branching.s - a.s) < SHORTEST_STEP:
                 self.points[-1] = attrs.evolve(a, kind=Kind.BRANCHING)
             elif branching is not None:
