@@ -39,6 +39,7 @@ from dap3d_core.formulations.joint_loops.loads import (
     push_freedoms,
 )
 from dap3d_core.formulations.joint_loops.profile import (
+    PART,
     factor_profile,
     solve_profile,
     weigh_kept_rows,
@@ -96,7 +97,7 @@ def solve_kept(system: System) -> None:
     """
     given = part = system.tree.kept.settings[layout.PART_OF_ROW]
     left = first = solve_profile(system)
-    while left > CONVERGED and part > LEAST:
+    while left > CONVERGED and part > LEAST and given == PART:  # less asks for its pivots alone
         part *= SMALLER
         factorise_anew(system, part)
         left = solve_profile(system)
