@@ -210,8 +210,9 @@ class DifferentiatedRun(Run):
 
     def _ended_slip(self, of: "Jumps") -> int:
         """The switch of a contact whose slip has come to an end; -1 where there is none."""
-        crossed = self.present.work.switches[CROSSED]
-        return next((k for k in of.sliding() if crossed[k] != 0.0), -1)
+        work = self.present.work
+        ended = [k for k in of.sliding() if work.switches[CROSSED, k] != 0.0]
+        return ended[0] if ended and self._ending.leads_to(work.t) else -1
 
     def _to_end_of_slip(self, t: float) -> Floats:
         """(n, p) derivatives of the state at time t; those of waiting rows are put right."""

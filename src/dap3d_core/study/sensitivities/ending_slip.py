@@ -54,6 +54,10 @@ class EndingSlip:
         """Where something jumps, what was before leads no further."""
         self._states.clear()
 
+    def leads_to(self, t: float) -> bool:
+        """True if a state before time t is known, from which slip has come."""
+        return bool(self._states) and self._states[0][0] < t
+
     def slopes(self, t: float) -> tuple[Floats, dict[float, Floats]]:
         """Slopes (n, lanes) of the state at time t, at which slip ends; of rows before, by time.
 
@@ -63,11 +67,9 @@ class EndingSlip:
         carried, differentiation = self._carried, self._differentiation
         arrays = differentiation.arrays()
         present = [array.copy() for array in arrays]
-        states = [state for state in self._states if state[0] < t]
-        times = np.array([*(state[0] for state in states), t])
-        begun, y, slopes, of_time = states[
-            np.flatnonzero(np.diff(times) > PART * (t - times[:-1]))[0]
-        ]
+        times = np.array([*(state[0] for state in self._states if state[0] < t), t])
+        is_long = np.diff(times) > PART * (t - times[:-1])  # the last one is
+        begun, y, slopes, of_time = self._states[int(np.argmax(is_long))]
         slopes = slopes - np.outer(self._run.evaluator.slope(begun, y), of_time)  # at that instant
         self._set(begun, y, slopes)
         found, rows = [(begun, slopes)], {}
@@ -78,12 +80,9 @@ class EndingSlip:
                 if status is not Status.RUNNING or carried.statistics.steps > MOST_STEPS:
                     what = f"there is no derivative of what happens at t = {t:.9g} s"
                     raise SimulationError(f"{what}: slip ends there, in what is stiff besides")
-                of_rows, width = (
-                    differentiation.slopes(carried.work.rows),
-                    carried.work.rows.shape[1],
-                )
+                of_rows = differentiation.slopes(carried.work.rows)
                 for k, row in enumerate(carried.rows()):
-                    rows[float(row[0])] = of_rows[k * width : (k + 1) * width].copy()
+                    rows[float(row[0])] = of_rows[k * row.size : (k + 1) * row.size].copy()
             of_state = differentiation.slopes(carried.work.state[Y])
             found.append((carried.t, of_state.copy()))
         (t_0, slopes_0), (t_1, slopes_1) = found[-2:]
