@@ -17,9 +17,8 @@ MOST, HANG = 2, 20.0
 EXACT = {"rtol": 1e-11, "atol": 1e-13, "t_end": SHORT, "dt": SHORT / 10}
 #: Difference of a parameter, as a part of it.
 STEP = 2e-4
-#: Error of a derivative, as a part of the largest. Slip that turns as it ends, and edges that are
-#: passed, leave some 1e-4 (docs/concepts/sensitivities.md): what is looked for is wrong by its
-#: own size.
+#: Error of a derivative, as a part of the largest. Edges that are passed leave some 1e-4
+#: (docs/concepts/sensitivities.md): what is looked for is wrong by its own size.
 WRONG = 3e-3
 #: Words of the errors that a run with derivatives may end with.
 REFUSED = ("there is no derivative", "derivatives end where")
