@@ -375,7 +375,10 @@ def assembled(sample: Sample) -> Sample | None:
         flat = J[free].transpose(1, 0, 2).reshape(J.shape[1], -1)
         flat, count = np.hstack([flat, gradient_of_rows(sample, state)]), 6 * len(free)
         v = np.concatenate([x[free].ravel(), state.unknowns[:, 1]])
-        v -= np.linalg.lstsq(flat, flat @ v - nu, rcond=1e-10)[0]
+        off = flat @ v - nu
+        if not np.isfinite(off).all():  # LAPACK would say so on stderr, in words of its own
+            return None
+        v -= np.linalg.lstsq(flat, off, rcond=1e-10)[0]
         x[free] = v[:count].reshape(-1, 6)
         unknowns = np.column_stack([state.unknowns[:, 0], v[count:]])
         moving = attrs.evolve(state.with_velocity(x), unknowns=unknowns)
