@@ -87,6 +87,7 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
     set_metric(metric, model.mass, model.Jp)
     idx, par, groups, starts = _tables(model, plan, what)
     turns, counted = turn_tables(model, len(par))
+    even, weak = mass_flags(model.mass, model.Jp, model.part_size)
     return System(
         body=body,
         metric=metric,
@@ -100,9 +101,8 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
         weight=np.ones(plan.row_size),
         settings=np.array(
             [
-                *(1e-15, 1e-15, 0.0, 0.0, *PENALTY, 0.0, model.length, masses_differ(model), 0.0),
-                float(any(group.read for group in model.forces)),
-                rows_are_weak(model),
+                *(1e-15, 1e-15, 0.0, 0.0, *PENALTY, 0.0, model.length, even, 0.0),
+                *(float(any(group.read for group in model.forces)), weak),
             ]
         ),
         friction=np.zeros(_friction_size(model, plan)),
@@ -221,8 +221,8 @@ def load_numbers(
     system.body[1:, MASS] = other.mass
     system.body[1:, JP : JP + 9] = other.Jp.reshape(-1, 9)
     set_metric(system.metric, other.mass, other.Jp)
-    system.settings[[LENGTH, EVEN]] = other.length, masses_differ(other)
-    system.settings[WEAK] = rows_are_weak(other)
+    system.settings[LENGTH] = other.length
+    system.settings[[EVEN, WEAK]] = mass_flags(other.mass, other.Jp, other.part_size)
     return regrouped(model, other, what)
 
 
@@ -254,20 +254,19 @@ def _all_groups(model: Model) -> tuple[Group, ...]:
     return (*model.functions, *model.forces, *model.joints, *model.friction)
 
 
-def masses_differ(model: Model) -> float:
-    """1.0 where a pivot would tell of the masses and not of the pose (UNEVEN), else 0.0."""
-    if not model.body_count:
-        return 0.0
-    return float(np.max(model.mass) > UNEVEN * np.min(model.mass))
+def mass_flags(mass: Floats, Jp: Floats, size: float) -> Floats:
+    """(..., 2) EVEN and WEAK of masses (..., n) and inertia matrices (..., n, 3, 3), 1.0 or 0.0.
 
-
-def rows_are_weak(model: Model) -> float:
-    """1.0 where masses or moments of inertia may make rows weak (VERY_UNEVEN), else 0.0."""
-    if not model.body_count:
-        return 0.0
-    moments = np.linalg.eigvalsh(model.Jp) / model.part_size**2
-    least = min(np.min(model.mass), np.min(moments))
-    return float(max(np.max(model.mass), np.max(moments)) > VERY_UNEVEN * least)
+    EVEN: a pivot would tell of the masses and not of the pose (UNEVEN); WEAK: masses and moments of
+    inertia, over the square of ``size``, m, of the largest part, may make rows weak (VERY_UNEVEN).
+    """
+    every = np.concatenate([mass[..., None], np.linalg.eigvalsh(Jp) / size**2], axis=-1)
+    every = every.reshape(*every.shape[:-2], -1)
+    of_masses, of_all = (
+        np.max(of, axis=-1, initial=0.0) > limit * np.min(of, axis=-1, initial=np.inf)
+        for of, limit in ((mass, UNEVEN), (every, VERY_UNEVEN))
+    )
+    return np.stack([of_masses, of_all], axis=-1).astype(np.float64)
 
 
 def set_metric(metric: Floats, mass: Floats, Jp: Floats) -> None:

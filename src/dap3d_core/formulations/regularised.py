@@ -53,8 +53,8 @@ def solve(system: System) -> None:
         add_pass(system)
     left = 0.0
     if system.settings[EVEN] != 0.0 or system.settings[WEAK] != 0.0:
-        left = add_passes(system, MORE_SOLVES)
-    if system.settings[WEAK] != 0.0 and left > ROUGH * system.settings[LENGTH]:
+        left = add_passes(system)
+    if system.settings[WEAK] != 0.0:
         solve_weak_rows(system, left)
     copy(system.multipliers, system.total)
     if has_friction(system):
@@ -62,11 +62,11 @@ def solve(system: System) -> None:
 
 
 @compiled
-def add_passes(system: System, most: int) -> float:
+def add_passes(system: System) -> float:
     """Passes, while each leaves much less of the rows; what is left, m/s^2."""
     left, passes = acceleration_residual(system), 0
     before = np.inf
-    while passes < most and left < FALLING * before:
+    while passes < MORE_SOLVES and left < FALLING * before:
         add_pass(system)
         before, left = left, acceleration_residual(system)
         passes += 1
@@ -93,14 +93,16 @@ def solve_weak_rows(system: System, left: float) -> None:
     leave as much by any part, and their multipliers are the larger the smaller it is: the passes
     before are taken.
     """
-    best, total, part, limit = system.velocity, system.right_side, PART, ROUGH
-    limit *= size_of_accelerations(system)
+    limit = ROUGH * size_of_accelerations(system)
+    if not left > limit:
+        return
+    best, total, part = system.velocity, system.right_side, PART
     copy(best, system.acceleration)
     copy(total, system.total)
     while left > limit and part > WEAKEST:
         part *= WEAKER
         factorise(system, part)
-        now = add_passes(system, MORE_SOLVES)
+        now = add_passes(system)
         if now < LESS * left:
             left = now
             copy(best, system.acceleration)

@@ -99,7 +99,9 @@ def settings_notes(compiled: CompiledModel, settings: Simulation) -> list[str]:
 def replaced_notes(
     compiled: CompiledModel, settings: Simulation, asked: Mapping[str, Any]
 ) -> list[str]:
-    """Notes on settings of steps that mean nothing, or another thing, where contacts are stepped.
+    """Notes on settings of steps that mean nothing, or another thing, for the scene's contacts.
+
+    Where contacts are not stepped, this is ``contact_step`` alone.
 
     Args:
         compiled: of the run.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from dap3d_core.assembly.arrays import EVEN, LENGTH, WEAK
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.switches import effects_of
 from dap3d_core.integrators.plugin_integrators import integrator_named
@@ -356,6 +357,7 @@ class ModelRebuilder:
 
     @staticmethod
     def _structure_of(evaluator: Evaluator) -> bytes:
-        """The nodes of a tree, where there is one: joints may move otherwise at a point."""
-        tree = evaluator.system.tree
-        return b"" if tree is None else bytes(tree.nodes.tobytes())
+        """What points share: scale and flags of masses; the nodes of a tree, which may differ."""
+        system = evaluator.system
+        nodes = system.tree.nodes.tobytes() if system.tree is not None else b""
+        return bytes(system.settings[[LENGTH, EVEN, WEAK]].tobytes() + nodes)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.assembly.metric import METRIC_CONSTANTS, METRIC_WIDTH
 from dap3d_core.assembly.turns import IS_POINT
-from dap3d_core.formulations.arrays import set_metric
+from dap3d_core.formulations.arrays import mass_flags, set_metric
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.element_states import INITIAL, TOLERANCE
 from dap3d_core.interface.examine.examine import prepared
@@ -141,7 +141,7 @@ class ParameterMap:
 
         Returns:
             (k, w) numbers; (k,) False where the scene's check refuses a point, and its numbers are
-            not valid.
+            not valid, and where masses differ so much more or less that a run has other passes.
         """
         valid = np.ones(len(values), dtype=bool)
         parts = [np.zeros((len(values), self._counters))]
@@ -345,7 +345,18 @@ class ParameterMap:
         least, middle, most = np.linalg.eigvalsh(np.where(np.abs(Jp) <= LARGEST, Jp, 0.0)).T
         sound = (least > ZERO_INERTIA * most) & (most >= SMALLEST_INERTIA)
         valid &= np.all(sound & (most <= least + middle), axis=0)
+        valid[valid] &= self._has_flags_of_scene(mass[valid], Jp[valid])
         return mass, Jp, valid
+
+    def _has_flags_of_scene(self, mass: Floats, Jp: Floats) -> Booleans:
+        """(k,) True where bodies that vary leave the model's flags of masses as they are."""
+        checked, model = self._checked, self._evaluator.model
+        every = np.repeat(checked.mass[None], len(mass), axis=0)
+        inertias = np.repeat(checked.Jp[None], len(mass), axis=0)
+        every[:, self._bodies], inertias[:, self._bodies] = mass, Jp
+        own = mass_flags(checked.mass, checked.Jp, model.part_size)
+        flags: Floats = mass_flags(every, inertias, model.part_size)
+        return np.asarray(np.all(flags == own, axis=-1), dtype=np.bool_)
 
 
 def _point_fields(checked: ValidatedScene, instance: Instance, point: str) -> Iterator[str]:

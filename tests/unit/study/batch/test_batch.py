@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import mechanisms, problems, trees
+from support import mechanisms, problems, redundant, trees
 from support.on_axles import driven, stone, wheel
 from support.plain import long_in_plain_python
 
@@ -133,6 +133,22 @@ def test_points_are_single_runs_bit_for_bit(case):
     for output_name, single in singly(of, points).items():
         assert np.array_equal(batch.values[output_name], single)
         assert np.all(np.isfinite(single))
+
+
+@long_in_plain_python
+@pytest.mark.parametrize("path", ["copied", "rebuilt"])
+def test_points_whose_masses_differ_much_more_have_the_passes_of_single_runs(path):
+    """A thin door on two hinges beside a thick one, whose rows need fewer passes."""
+    scene = redundant.hinged_door()
+    scene.bodies["door"].Jp = (4.0, 4.0, 4.0)
+    metric = "mass" if path == "rebuilt" else "unit"
+    of = ensemble(scene, ["bodies.door.Jp.y"], ["door.w", "H0.force"], method="lsq", t_end=0.1,
+                  dt=0.05, correct_metric=metric)  # fmt: skip
+    points = np.array([[4.0], [1e-7], [2.0]])
+    assert path_of(of) == path
+    batch = of.run(points)
+    for name, single in singly(of, points).items():
+        assert np.array_equal(batch.values[name], single)
 
 
 @long_in_plain_python
