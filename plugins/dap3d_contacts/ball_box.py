@@ -70,6 +70,10 @@ class BallBox(Contact):
     def normal(r_P_i, r_P_j, A_j, size):
         return rotate(A_j, surface(r_P_i, r_P_j, A_j, size)[1])
 
+    def seam(r_P_i, r_P_j, A_j, size):
+        of_axes = zip(rotate(transpose(A_j), sub(r_P_i, r_P_j)), size, strict=True)
+        return tuple(where(x < 0.0, -x, x) - 0.5 * length for x, length in of_axes)
+
 
 @hookimpl
 def dap3d_contacts():

@@ -64,6 +64,12 @@ class BallCylinder(Contact):
     def normal(r_P_i, r_P_j, a_j, radius_j, length):
         return surface(r_P_i, r_P_j, a_j, radius_j, length)[1]
 
+    def seam(r_P_i, r_P_j, a_j, radius_j, length):
+        d = sub(r_P_i, r_P_j)
+        x = dot(d, a_j)
+        side = sub(d, scale(x, a_j))
+        return where(x < 0.0, -x, x) - 0.5 * length, sqrt(dot(side, side)) - radius_j
+
 
 @hookimpl
 def dap3d_contacts():

@@ -27,9 +27,9 @@ KINDS = (
 ) = range(len(KINDS))  # fmt: skip
 
 # What a switch does where it becomes negative, or changes its sign: the run ends; the integration
-# begins anew; the same without a note; velocities or states jump; so they do, and a mode of a
-# contact ends.
-ENDS, BEGINS, UNSEEN, JUMPS, MODE_ENDS = 1, 0, -1, 2, 3
+# begins anew; the same without a note, between laws that join smoothly, and between others;
+# velocities or states jump; so they do, and a mode of a contact ends.
+ENDS, BEGINS, UNSEEN, SEAM, JUMPS, MODE_ENDS = 1, 0, -1, -2, 2, 3
 
 # Places in ``settings``: projection tolerances of position and velocity, a scratch number, how
 # often the multipliers did not settle with friction, the numbers of the penalty formulation, how

@@ -6,7 +6,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.assembly.arrays import BEGINS, ENDS, JUMPS, MODE_ENDS, UNSEEN, Floats
+from dap3d_core.assembly.arrays import BEGINS, ENDS, JUMPS, MODE_ENDS, SEAM, UNSEEN, Floats
 from dap3d_core.interface.codegen.specialise import KNOTS
 from dap3d_core.model import Group, Model
 from dap3d_core.model.knots import narrowest
@@ -65,15 +65,15 @@ class Switch:
     @property
     def is_contact(self) -> bool:
         """True of contacts, where a mode ends."""
-        return bool(self.group.type_info.type.is_contact)
+        return self.kind == "switch" and bool(self.group.type_info.type.is_contact)
 
     @property
     def effect(self) -> int:
-        """Effect on a run: ENDS, BEGINS, UNSEEN, JUMPS or MODE_ENDS."""
+        """Effect on a run: ENDS, BEGINS, UNSEEN, SEAM, JUMPS or MODE_ENDS."""
         if self.words:
             return ENDS
         if self.kind == "knot":
-            return UNSEEN
+            return SEAM if self.group.type_info.type.is_contact else UNSEEN
         if self.jumps:
             return MODE_ENDS if self.is_contact else JUMPS
         return BEGINS
@@ -89,6 +89,8 @@ class Switch:
                 return STILL * self.length
             touches = self.is_contact or (self.jumps and type_.unilateral and not self.words)
             return POSITION_ROUNDING * self.length if touches else 0.0
+        if self.effect == SEAM:
+            return POSITION_ROUNDING * self.length
         row, numbers = self.group.numbers[self.place], self.group.type_info.layout.numbers
         own = [place for name, place in numbers.items() if name.endswith(KNOTS)]
         knots = [row[at : at + count] for at, (count,) in own]

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import ENDS, JUMPS, MODE_ENDS, UNSEEN
+from dap3d_core.assembly.arrays import ENDS, JUMPS, MODE_ENDS, SEAM, UNSEEN
 from dap3d_core.assembly.evaluate import copy
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration_state import Function, IntegrationState
@@ -31,7 +31,10 @@ from dap3d_core.integrators.stepping.switch_values import (
     evaluate,
     evaluate_start,
     find_switch_rates,
+    first_across,
+    has_jumped,
     is_across,
+    is_along_seam,
     may_rest,
     near_edge,
     rate_difference,
@@ -62,8 +65,7 @@ SAME = 1.0 / 32.0
 #: part of its drop: of a sine 5 % in a step of 1.5 rad, 20 % in one of 3.
 MAX_SUSPICIONS, PLACES, NEWTON_STEPS, CUBIC_ERROR = 8, 16, 3, 0.25
 #: Newton steps for derivatives of an instant; each leaves the error of the rate, 1e-4 as a rule.
-#: Part of the change over such a difference that a switch may be from zero where it has crossed it.
-CROSSING_PASSES, JUMPED = 4, 0.01
+CROSSING_PASSES = 4
 #: A switch that changes its sign more often than this while time advances by less than this part of
 #: the run chatters.
 CHATTER, CHATTER_SPAN = 100, 1e-6
@@ -310,7 +312,10 @@ def update_switches_after_step(
         stalled |= is_short & approaches & is_same & (k == work.near_switch)
         s[at.BEND, k] = (s[at.FOUND_RATE, k] - s[at.RATE, k]) / h
         s[at.VALUE, k], s[at.RATE, k] = s[at.FOUND, k], s[at.FOUND_RATE, k]
-        if s[at.SIDE, k] == 0.0:
+        if is_along_seam(work, k):
+            s[at.VALUE, k] -= s[at.SIDE, k] * s[at.BAND, k]
+            s[at.SIDE, k] = 0.0  # until it leaves
+        elif s[at.SIDE, k] == 0.0:
             s[at.SIDE, k] = np.sign(s[at.FOUND, k])
             s[at.VALUE, k] += s[at.SIDE, k] * s[at.BAND, k]
     work.cut_attempts = 0
@@ -340,7 +345,9 @@ def bisect_crossing(
                 low = middle
             middle = 0.5 * (low + high)
         if failure == at.RUNNING:
-            high = differentiated_crossing(work, high, slope, rates, project, watch, system, loops)
+            high = differentiated_crossing(
+                work, high, slope, rates, rhs, project, watch, system, loops
+            )
             if is_differentiated() and has_jumped(work):
                 unknown, high = with_slopes(0.0, high * np.nan), with_slopes(high, 0.0)
             failure = euler_step(work, high, slope, rates, project, watch, system, loops)
@@ -392,8 +399,8 @@ def leaves_zero(work: IntegrationState, crossed: bool) -> bool:
 
 @compiled
 def differentiated_crossing(
-    work: IntegrationState, h: float, slope: Floats, rates: Floats, project: Function,
-    watch: Function, system: Any, loops: Any,
+    work: IntegrationState, h: float, slope: Floats, rates: Floats, rhs: Function,
+    project: Function, watch: Function, system: Any, loops: Any,
 ) -> float:  # fmt: skip
     """The length h of an Euler step to a crossing, with the derivatives that keep the switch zero.
 
@@ -404,6 +411,8 @@ def differentiated_crossing(
         return h
     s, count = work.switches, work.projection_count
     beside = with_slopes(rate_difference(work), 0.0)
+    euler_step(work, h, slope, rates, project, watch, system, loops)
+    put_rates_before(work, slope, rates, rhs, system, loops)
     for _ in range(CROSSING_PASSES):
         euler_step(work, h + beside, slope, rates, project, watch, system, loops)
         copy(s[at.FOUND_RATE], s[at.FOUND])
@@ -419,24 +428,17 @@ def differentiated_crossing(
 
 
 @compiled
-def first_across(s: Floats) -> int:
-    """The first switch that lies across; -1 where none does."""
-    for k in range(s.shape[1]):
-        if s[at.FOUND, k] * s[at.SIDE, k] < 0.0:
-            return k
-    return -1
-
-
-@compiled
-def has_jumped(work: IntegrationState) -> bool:
-    """True if the switch that was crossed last jumped there, by its rate beside: no zero of it is.
-
-    Its instant has derivatives of another kind then, which are NaN here (study/sensitivities).
-    """
-    s, k = work.switches, first_across(work.switches)
-    if k < 0:
-        return False
-    return abs(s[at.FOUND, k]) > JUMPED * abs(s[at.FOUND_RATE, k]) * rate_difference(work)
+def put_rates_before(
+    work: IntegrationState, slope: Floats, rates: Floats, rhs: Function, system: Any, loops: Any
+) -> None:
+    """Put the rates before a seam, of which the state is beyond, as far as its band allows."""
+    s, k, before = work.switches, first_across(work.switches), work.state[at.TRIAL]
+    if k < 0 or s[at.DOES, k] != SEAM or s[at.RATE, k] == 0.0:
+        return
+    back = with_slopes(2.0 * abs(s[at.BAND, k] / s[at.RATE, k]), 0.0)
+    for i in range(before.shape[0]):
+        before[i] = work.state[at.Y, i] - back * slope[i]
+    rhs(work.t - back, before, rates, system, loops)
 
 
 @compiled

@@ -96,8 +96,8 @@ class Integration(Restorable):
     ends
         (2, q) for each switch that the fifth function gives, what it does: the run ENDS where it
         becomes negative; the integration BEGINS anew where it changes its sign
-        (stepping/event_location.py), which is noted down, or UNSEEN. And how far beyond zero it may
-        be until that is so.
+        (stepping/event_location.py), which is noted down, or UNSEEN, or a SEAM. And how far beyond
+        zero it may be until that is so.
     stops
         Times in ascending order that no step goes over, and whether the right-hand side may jump
         there, so that the integration starts anew (stepping/break_points.py).

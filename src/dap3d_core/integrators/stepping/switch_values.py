@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import ENDS, JUMPS, UNSEEN
+from dap3d_core.assembly.arrays import ENDS, JUMPS, SEAM, UNSEEN
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration_state import Function, IntegrationState
 from dap3d_core.kernels.array_types import Floats
@@ -12,6 +12,10 @@ from dap3d_core.kernels.runtime.cache import compiled
 
 #: Part of a usual step over which rates are found by differences, and the least part of the time.
 DIFFERENCE, LEAST_DIFFERENCE = 1e-4, 1e-8
+#: Part of the change over such a difference that a switch may be from zero where it has crossed it.
+JUMPED = 0.01
+#: Bands from a seam, and in a usual step, within which motion follows it.
+ALONG = 1e6
 
 
 @compiled
@@ -53,6 +57,14 @@ def near_edge(s: Floats, k: int) -> float:
     The near edge of its band, unless it may be at rest in it. Where it is UNSEEN both laws are one.
     """
     return 0.0 if may_rest(s, k) or s[at.DOES, k] == UNSEEN else s[at.BAND, k]
+
+
+@compiled
+def is_along_seam(work: IntegrationState, k: int) -> bool:
+    """True if switch k is a seam that the motion follows: on which side it is would be rounding."""
+    s = work.switches
+    near = abs(s[at.VALUE, k]) + abs(s[at.RATE, k]) * usual_step(work)
+    return s[at.DOES, k] == SEAM and near < ALONG * s[at.BAND, k]
 
 
 @compiled
@@ -105,6 +117,15 @@ def is_across(s: Floats, row: int) -> bool:
 
 
 @compiled
+def first_across(s: Floats) -> int:
+    """The first switch that lies across; -1 where none does."""
+    for k in range(s.shape[1]):
+        if s[at.FOUND, k] * s[at.SIDE, k] < 0.0:
+            return k
+    return -1
+
+
+@compiled
 def changes_sign(s: Floats, row: int) -> bool:
     """True if a switch is on another side, or zero: then it is not known which law holds."""
     found = 0
@@ -114,9 +135,21 @@ def changes_sign(s: Floats, row: int) -> bool:
 
 
 @compiled
+def has_jumped(work: IntegrationState) -> bool:
+    """True if the switch that was crossed last jumped there, by its rate beside: no zero of it is.
+
+    Its instant has derivatives of another kind then, which are NaN here (study/sensitivities).
+    """
+    s, k = work.switches, first_across(work.switches)
+    if k < 0:
+        return False
+    return abs(s[at.FOUND, k]) > JUMPED * abs(s[at.FOUND_RATE, k]) * rate_difference(work)
+
+
+@compiled
 def record_crossing(work: IntegrationState, k: int, t: float) -> None:
-    """Record that a switch changed its sign, unless it is UNSEEN, or velocities jump there."""
-    if work.switches[at.DOES, k] == UNSEEN or work.switches[at.DOES, k] >= JUMPS:
+    """Record that a switch changed its sign, unless it is unseen, or velocities jump there."""
+    if work.switches[at.DOES, k] <= UNSEEN or work.switches[at.DOES, k] >= JUMPS:
         return
     count = work.crossing_count
     if count < at.LOGGED:

@@ -13,7 +13,7 @@ from dap3d_core.interface.types import Joint, TypeBase
 #: What authors define.
 DECLARED = ("gap", "normal")
 #: What they may define besides.
-OPTIONAL = ("at", "reach", "along", "grip", "grain", "resist")
+OPTIONAL = ("at", "reach", "seam", "along", "grip", "grain", "resist")
 #: Kinds of surfaces in pictures -> the fields, with the letter of the body or without it, and
 #: numbers of ``prepare``, that each is drawn from (view/scene3d/contact_shapes.py).
 SURFACES: Mapping[str, tuple[str, ...]] = {
@@ -53,7 +53,9 @@ class Contact(Joint):
 
     A fourth is for surfaces that end, as edges do: ``reach``, not negative while the point of
     contact is on both of them. Where it becomes negative the contact opens, whatever its force, and
-    beyond it nothing touches.
+    beyond it nothing touches. ``seam`` is for surfaces of several parts, one or more numbers that
+    change sign where the point goes from one to the next: the force may jump there with the curvature,
+    and a step ends.
 
     Without ``at`` the gap is an angle, m being rad, and the normal the axis of a moment on body i,
     which alone acts: the rate of the gap is the angular velocity of body i less that of body j
@@ -100,7 +102,7 @@ class Contact(Joint):
     """
 
     kernel_names: ClassVar[tuple[str, ...]] = (  # type: ignore[assignment]
-        *DECLARED, *OPTIONAL, *Joint.kernel_names, "tension"
+        *DECLARED, *OPTIONAL, *Joint.kernel_names, "tension", "knot"
     )  # fmt: skip
     rows = 3
     holonomic: ClassVar[bool | tuple[bool, ...]] = (True, False, False)
@@ -298,6 +300,9 @@ def _expressions(
         calls["reach"] = f"reach__({', '.join(wanted['reach'])})"
     else:
         calls["reach"] = "1.0"
+    if "seam" in declared:
+        wanted["seam"] = list(parameters(declared["seam"]))
+        calls["seam"] = f"seam__({', '.join(wanted['seam'])})"
     if "grain" not in declared:
         calls |= {"grain": "None", "grain_dot": "None"}
     if "grip" in declared:

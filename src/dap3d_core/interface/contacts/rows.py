@@ -263,6 +263,12 @@ def switch_within(
     return where(closed(mode), held_within, open_), slips
 
 
+def knot(seam, mode):
+    """Numbers that change sign between parts of surfaces, where it is closed."""
+    parts = seam if isinstance(seam, tuple) else (seam,)
+    return tuple(where(closed(mode), x, 1.0) for x in parts)
+
+
 def rate(mode, way, near):
     """Mode, direction and shares stay between events."""
     return 0.0, _ZERO, _ZERO
@@ -334,6 +340,7 @@ KERNELS = {"C": position, "J": blocks, "gamma": gamma, "friction": friction, "sw
 #: Those in their place, by what a type of contact declares.
 KERNELS_WITH: dict[str, dict[str, Any]] = {
     "reach": {"C": position_within, "switch": switch_within},
+    "seam": {"knot": knot},
     "grip": {"tension": output_with_law},
 }
 #: Of a contact whose gap is an angle: one row, of a moment about its normal. The two rows across

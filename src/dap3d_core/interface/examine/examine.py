@@ -464,7 +464,7 @@ def _expected(
         return (slots, count, 6), f"a block of rows x 6 for each of {slots} bodies"
     if kernel == "resist":
         return (2,), "2 numbers, lengths of rolling and of spinning"
-    if kernel in ("switch", "tension", "grip"):
+    if kernel in ("switch", "tension", "grip", "seam", "knot"):
         shape = (len(value),) if isinstance(value, tuple) and value else ()
         return shape, "one number, or a tuple of numbers"
     if kernel in ("wrench", "friction"):

@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+import dap3d_core as dap
 from dap3d_core.integrators.stepping.event_location import cubic_minimum, lowest_between
 
 
@@ -41,3 +43,26 @@ def test_a_dip_that_the_ends_do_not_show_is_seen_by_a_sample():
 def test_without_a_sample_between_the_ends_count():
     ends = 0.0, 1.0, 0.3, 1.9
     assert lowest_between(*ends, 0.0, 0.0) == cubic_minimum(*ends) < 1.0
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "radau"])
+def test_a_ball_that_rolls_along_a_seam_passes_none(integrator):
+    """Its centre is above the edge of a box, to rounding of places 100 m away. It took 3600 steps
+    where each passage was located."""
+    turn, place = Rotation.from_rotvec([-0.5, -0.6, 0.9]), np.array([58.0, -16.0, 31.0])
+    scene = dap.Scene(name="on an edge")
+    scene.add_body("box", mass=1.0, Jp=(1.0, 1.0, 1.0), r=place,
+                   p=turn.as_quat(scalar_first=True))  # fmt: skip
+    scene.add_joint("fix", "hold", body_i="box")
+    start, motion = turn.apply([-0.3, 0.2, 0.15]), turn.apply([1.0, 0.0, 0.0])
+    scene.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=place + start, r_dot=motion)
+    scene.add_force("weight", "g", wgt=turn.apply([0.0, 0.0, -1.0]))
+    scene.add_contact("ball_box", "table", P_i="ball.O", P_j="box.O", radius=0.1,
+                      size=(1.0, 0.4, 0.1), mu=0.5)  # fmt: skip
+    result = dap.simulate(scene, t_end=0.5, dt=0.5, integrator=integrator)
+    assert result.stats.steps + result.stats.rejected < 60
+    slip = 2.0 / (7.0 * 0.5 * 9.81)  # then it rolls, at 5/7 of its speed
+    x = turn.inv().apply(result.r[-1, 1] - place)
+    assert x == pytest.approx(
+        [-0.3 + slip * 6.0 / 7.0 + 5.0 / 7.0 * (0.5 - slip), 0.2, 0.15], abs=1e-6
+    )
