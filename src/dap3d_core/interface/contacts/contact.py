@@ -54,8 +54,8 @@ class Contact(Joint):
     A fourth is for surfaces that end, as edges do: ``reach``, not negative while the point of
     contact is on both of them. Where it becomes negative the contact opens, whatever its force, and
     beyond it nothing touches. ``seam`` is for surfaces of several parts, one or more numbers that
-    change sign where the point goes from one to the next: the force may jump there with the curvature,
-    and a step ends.
+    change sign where the point goes from one to the next: the force may jump there with the
+    curvature, and a step ends.
 
     Without ``at`` the gap is an angle, m being rad, and the normal the axis of a moment on body i,
     which alone acts: the rate of the gap is the angular velocity of body i less that of body j
