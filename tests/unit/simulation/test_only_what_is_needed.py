@@ -13,7 +13,13 @@ HEAVY = {"numpy", "scipy", "llvmlite", "matplotlib", "netCDF4", "xarray"}
 
 
 #: A run that needs nothing but a joint and a weight.
-PLAIN_RUN = "import dap3d_core as dap\ndap.simulate('pen1', t_end=0.04, dt=0.02)"
+PLAIN_RUN = "import dap3d_core as dap\nresult = dap.simulate('pen1', t_end=0.04, dt=0.02)"
+QUANTITIES = """result.quantity("cone.r.z")
+try:
+    result.quantity("cone")
+except KeyError:
+    pass"""
+STEPPED_RUN = "dap.start('pen1').step(0.01)"
 #: Runs of a model to which something may be added; tells its loops and sizes of arrays.
 SCENE = """
 import dap3d_core as dap
@@ -39,10 +45,12 @@ NEEDED = {
     "scene.add_shape('toothed-wheel', 's', body='upper', radius=0.1, width=0.1, teeth=9)": (
         {"dap3d_example.toothed_wheel", "dap3d_core.registry.extensions"}, ()),
 }  # fmt: skip
+#: What sets the inputs of a stepped run.
+SETTING_INPUTS = ("dap3d_core.simulation.control", "dap3d_core.simulation.stepwise",
+                  "dap3d_core.integrators.stepping.hold")  # fmt: skip
 #: Modules that neither model below needs, and parts of the core.
 NOWHERE = ("matplotlib", "netCDF4", "xarray", "rich", "dap3d_core.formulations.joint",
-           "dap3d_functions.grid", "dap3d_core.simulation.control", "scipy.optimize",
-           "dap3d_core.simulation.stepwise", "dap3d_core.integrators.stepping.hold",
+           "dap3d_functions.grid", "scipy.optimize", *SETTING_INPUTS,
            "dap3d_core.model.reaction_groups", "dap3d_core.interface.codegen.unknowns",
            "dap3d_core.kernels.eliminate_unknowns", "dap3d_core.scene.signals",
            "dap3d_core.interface.codegen.terms")  # fmt: skip
@@ -58,8 +66,9 @@ LOADED = """import dap3d_core as dap
 for name in dap.shipped_models():
     if name not in ("sphere_box", "walker"):
         dap.load(name).to_toml()"""
-VIEWED = "import dap3d_core as dap; assert dap.view(dap.simulate('bodies2', t_end=0.04)).html"
-#: A script -> what it leaves alone, by the beginnings of names of modules.
+VIEWED = "assert dap.view(dap.simulate('bodies2', t_end=0.04)).html"
+#: Scripts, one after another in one process, and what they leave alone, by beginnings of names of
+#: modules: the package, its registry, scenes, results, a run, its quantities, a page.
 LEFT_ALONE = {
     "import dap3d_core": (*HEAVY, "rich", "click", "pluggy", "dap3d_joints", "dap3d_forces",
                           "dap3d_functions"),
@@ -71,17 +80,21 @@ LEFT_ALONE = {
     PLAIN_RUN: ("dap3d_formats", "dap3d_core.formats", "dap3d_core.interface.formats", "xml",
                 "pyexpat", "dap3d_core.study", "dap3d_core.simulation.kinematics",
                 "scipy.integrate", "dap3d_core.simulation.redundancy.freedoms",
-                "numpy.ma.", "uuid"),
+                "numpy.ma.", "uuid", *SETTING_INPUTS),
+    QUANTITIES: ("dap3d_core.scene.expressions", "graphlib"),
+    STEPPED_RUN: ("dap3d_core.scene.signals", "dap3d_core.interface.codegen.terms"),
     # a page of a scene without meshes: nothing for plots in files, or for meshes
     VIEWED: ("matplotlib", "trimesh", "netCDF4", "xarray", "rich", "click"),
 }  # fmt: skip
 
 
-@pytest.mark.every(3)
-@pytest.mark.parametrize(("script", "others"), LEFT_ALONE.items(), ids=range(len(LEFT_ALONE)))
-def test_a_script_leaves_alone_what_it_does_not_need(script, others):
-    """The package, its registry, scenes, results, a run, a page."""
-    assert not [m for m in imported(script) if m.startswith(tuple(others))]
+def test_a_script_leaves_alone_what_it_does_not_need():
+    """And a stepped run loads what sets its inputs."""
+    said = run("\n".join(f"{script}\n{MODULES}" for script in LEFT_ALONE)).splitlines()
+    found = dict(zip(LEFT_ALONE, (set(line.split()) for line in said), strict=True))
+    for script, others in LEFT_ALONE.items():
+        assert not [m for m in found[script] if m.startswith(tuple(others))], script
+    assert found[STEPPED_RUN] >= set(SETTING_INPUTS)
 
 
 def told(model, added="", method="auto"):
@@ -131,14 +144,6 @@ def test_joint_coordinates_are_imported_where_a_scene_takes_them():
     _, _, found = told("pen1", method="joint")
     assert "dap3d_core.formulations.joint" in found
     assert "dap3d_core.formulations.joint_loops" not in found  # a tree keeps no rows
-
-
-def test_a_stepped_run_loads_what_sets_its_inputs():
-    names = {"dap3d_core.simulation.control", "dap3d_core.simulation.stepwise",
-             "dap3d_core.integrators.stepping.hold"}  # fmt: skip
-    found = imported("import dap3d_core as dap\ndap.start('pen1').step(0.01)")
-    assert names <= found
-    assert not found & {"dap3d_core.scene.signals", "dap3d_core.interface.codegen.terms"}
 
 
 @pytest.mark.slow
