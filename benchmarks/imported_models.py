@@ -84,11 +84,11 @@ def oracle_of(peer, path, model):
     """
     try:
         if peer == "Pinocchio":
-            from support.pinocchio_models import Oracle
+            from pinocchio_models import Oracle
 
             return Oracle(path)
         if peer == "Drake":
-            from support.drake_models import Oracle
+            from drake_models import Oracle
 
             return Oracle(path, model.gravity)
         from support.bare_mujoco import BareOracle

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.browser import Opened, browser
 from support.falling import SCENE
 from support.process import ONE_CORE, UNOPTIMISED
 
@@ -125,3 +126,25 @@ def scene_file(tmp_path):
         return path
 
     return write
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with browser() as found:
+        yield found
+
+
+@pytest.fixture
+def show(chromium, tmp_path):
+    """Opens pages, or the files of such, in a browser. At the end none has complained."""
+    shown = []
+
+    def call(page, **window):
+        file = page if isinstance(page, Path) else page.save(tmp_path / f"{len(shown)}.html")
+        shown.append(Opened(chromium, file, **window))
+        return shown[-1]
+
+    yield call
+    for found in shown:
+        found.close()
+        assert found.complaints == []

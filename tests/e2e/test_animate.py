@@ -76,7 +76,7 @@ def test_several_runs_are_told_apart_by_their_folders(dap3d, runs):
     assert "named twice" in again.stderr
 
 
-def test_a_window_that_cannot_be_opened_is_told(refuse, dap3d, runs, monkeypatch):
+def test_a_window_that_cannot_be_opened_is_told(refuse, pen1, monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "agg")
     assert "cannot open a window" in refuse("plot", "pen1.nc", "cone.r.z", "--show")
 
@@ -91,7 +91,7 @@ def test_no_colour_when_asked(dap3d):
 
 
 @pytest.mark.slow
-def test_the_command_needs_no_display_and_no_window_package(dap3d, runs):
+def test_the_command_needs_no_display_and_no_window_package(dap3d, pen1):
     """pyplot, which opens windows, stays out; so do the solver's kernels."""
     script = (
         "import sys; from dap3d_core.cli import main;"

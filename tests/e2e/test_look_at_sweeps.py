@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import xarray
 from support import hostile
-from support.browser import Opened, browser
 from support.pages import follow
 from support.process import REPOSITORY
 from support.rotations import to_global
@@ -19,12 +18,6 @@ pytestmark = pytest.mark.slow  # a browser that draws without a graphics card
 
 MASS, WY = "bodies.cone.mass", "bodies.cone.w.y"
 TIMES = {"t_end": 0.4, "dt": 0.02}
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with browser() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")
@@ -40,11 +33,8 @@ def page(swept, tmp_path_factory):
 
 
 @pytest.fixture
-def opened(chromium, page):
-    found = Opened(chromium, page)
-    yield found
-    found.close()
-    assert found.complaints == []
+def opened(show, page):
+    return show(page)
 
 
 @pytest.fixture
@@ -188,41 +178,37 @@ def test_a_point_that_failed_says_why(opened):
 
 
 @pytest.mark.long
-def test_gravity_is_that_of_the_point(chromium, tmp_path):
+def test_gravity_is_that_of_the_point(show):
     vary = {"forces.gravity.gravity": [9.81, 1.62, 0.0]}
     data = dap.sweep("pen1", vary, outputs="cone.r.z", **TIMES)
-    found = Opened(chromium, dap.view(data).save(tmp_path / "page.html"))
+    found = show(dap.view(data))
     told = []
     for k in range(3):
         found.run("k => dap3d.choose(k)", k)
         found.drawn()
         told.append(found.page.locator("#labels .ground").first.inner_text())
     assert [words.split()[1] for words in told] == ["9.81", "1.62", "0"]
-    found.close()
-    assert found.complaints == []
 
 
 @pytest.mark.long
-def test_sliders_and_plots_have_room(chromium, page):
+def test_sliders_and_plots_have_room(show, page):
     """On a telephone."""
     size = (390, 844)
-    found = Opened(chromium, page, width=size[0], height=size[1])
+    found = show(page, width=size[0], height=size[1])
     assert found.run("document.documentElement.scrollWidth") <= size[0]
     boxes = [found.page.locator(one).bounding_box() for one in ("#sweep", "#tabs", "#tab-plots")]
     for box in boxes:
         assert box["y"] + box["height"] <= size[1] + 1
         assert box["width"] > 0.25 * size[0]
     assert boxes[0]["y"] + boxes[0]["height"] <= boxes[1]["y"] + 1
-    found.close()
-    assert found.complaints == []
 
 
 @pytest.mark.long
-def test_samples_have_one_slider(chromium, tmp_path):
+def test_samples_have_one_slider(show):
     data = dap.sweep(
         "pen1", {MASS: "3~0.2", WY: "-10:-4"}, outputs="cone.r.z:min", sample=60, **TIMES
     )
-    found = Opened(chromium, dap.view(data).save(tmp_path / "page.html"))
+    found = show(dap.view(data))
     assert found.page.locator("#sweep input").count() == 1
     found.run("dap3d.choose(49)")
     found.drawn()
@@ -231,11 +217,9 @@ def test_samples_have_one_slider(chromium, tmp_path):
     assert "50 of 60 points of the sweep are on this page" in words
     mass = float(data[MASS][59])
     assert f"{float(f'{mass:.4g}'):g} kg" in words
-    found.close()
-    assert found.complaints == []
 
 
-def test_texts_of_a_sweep_stay_texts(chromium, swept, tmp_path):
+def test_texts_of_a_sweep_stay_texts(show, swept):
     """Outputs and notes of a file from somebody who means harm."""
     data = swept.rename(
         dict(zip(("cone.r.z:min", "J1.force.norm:max"), hostile.NAMES, strict=False))
@@ -243,12 +227,10 @@ def test_texts_of_a_sweep_stay_texts(chromium, swept, tmp_path):
     data = data.assign(note=xarray.full_like(data["note"], hostile.NAMES[3]))
     for k, name in enumerate(data.data_vars):
         data[name].attrs.update(long_name=hostile.NAMES[4 + k], units=hostile.NAMES[0])
-    found = Opened(chromium, dap.view(data).save(tmp_path / "page.html"))
+    found = show(dap.view(data))
     for k in (1, 0, 2):
         found.run("k => dap3d.choose(k, 1)", k)
         found.drawn()
     assert hostile.NAMES[0] in found.page.inner_text("#sweep")
     assert found.run(f"typeof window.{hostile.MARK}") == "undefined"
     assert found.run("document.querySelectorAll('img, iframe').length") == 0
-    found.close()
-    assert found.complaints == []

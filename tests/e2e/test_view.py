@@ -5,18 +5,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from support.browser import Opened, browser
 from support.rotations import to_global
 
 import dap3d_core as dap
 
 pytestmark = pytest.mark.slow  # a browser that draws without a graphics card
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with browser() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")
@@ -31,11 +24,8 @@ def four_page(four, tmp_path_factory):
 
 
 @pytest.fixture
-def opened(chromium, four_page):
-    page = Opened(chromium, four_page)
-    yield page
-    page.close()
-    assert page.complaints == []
+def opened(show, four_page):
+    return show(four_page)
 
 
 def chain(count):
@@ -210,14 +200,14 @@ def test_the_speed_says_how_fast_time_goes(opened):
     assert 0.0 < passed <= 0.01 * (end - start) / 1000.0
 
 
-def test_pixels_are_where_the_body_is(chromium, tmp_path):
+def test_pixels_are_where_the_body_is(show):
     """A red ball falls; where the page says it is, the picture is red, and elsewhere not."""
     scene = dap.Scene(name="ball")
     scene.add_body("ball", Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 2.0), color="#ff0000")
     scene.add_shape("sphere", body="ball", radius=0.2)
     scene.add_force("weight")
     result = dap.simulate(scene, t_end=0.6, dt=0.1)
-    page = Opened(chromium, dap.view(result).save(tmp_path / "ball.html"))
+    page = show(dap.view(result))
     for key in ("t", "n", "g"):  # without traces, labels, ground
         page.page.keyboard.press(key)
     seen = {}
@@ -234,16 +224,14 @@ def test_pixels_are_where_the_body_is(chromium, tmp_path):
     assert seen[0.6] > seen[0.0] + 100
     page.page.mouse.click(*at)
     assert page.page.inner_text("#picked") == "sphere1"
-    page.close()
-    assert page.complaints == []
 
 
 @pytest.mark.parametrize(
     ("size", "theme"),
     [pytest.param((1280, 800), "light", marks=pytest.mark.long), ((390, 844), "dark")],
 )
-def test_the_whole_motion_is_in_the_frame(chromium, four_page, four, size, theme):
-    page = Opened(chromium, four_page, width=size[0], height=size[1], theme=theme)
+def test_the_whole_motion_is_in_the_frame(show, four_page, four, size, theme):
+    page = show(four_page, width=size[0], height=size[1], theme=theme)
     width, height = page.run("[dap3d.app.stage.width, dap3d.app.stage.height]")
     for k in range(0, 101, 10):
         page.run("t => dap3d.seek(t)", float(four.t[k]))
@@ -253,8 +241,6 @@ def test_the_whole_motion_is_in_the_frame(chromium, four_page, four, size, theme
                 assert 0 < p["x"] < width
                 assert 0 < p["y"] < height
     assert page.run("document.documentElement.scrollWidth") <= size[0]
-    page.close()
-    assert page.complaints == []
 
 
 LONG = pytest.mark.long
@@ -263,14 +249,12 @@ LONG = pytest.mark.long
 @pytest.mark.parametrize(
     "model", ["tri", pytest.param("A05", marks=LONG), pytest.param("ball1", marks=LONG)]
 )
-def test_shipped_models_are_shown_without_complaint(chromium, tmp_path, model):
+def test_shipped_models_are_shown_without_complaint(show, model):
     result = dap.simulate(model, t_end=0.2, dt=0.02, allow_code=True)
-    page = Opened(chromium, dap.view(result).save(tmp_path / "page.html"))
+    page = show(dap.view(result))
     page.run("dap3d.seek(0.1)")
     for tab in ("display", "run", "source", "plots"):
         page.page.click(f"[data-tab={tab}]")
-    page.close()
-    assert page.complaints == []
 
 
 def test_ten_seconds_of_five_bodies_are_under_three_megabytes(tmp_path):
@@ -279,13 +263,11 @@ def test_ten_seconds_of_five_bodies_are_under_three_megabytes(tmp_path):
 
 
 @pytest.mark.long
-def test_two_hundred_bodies_are_drawn_by_few_calls(chromium, tmp_path):
+def test_two_hundred_bodies_are_drawn_by_few_calls(show):
     """Bodies of one shape are one call of the graphics card."""
     result = dap.simulate(chain(200), t_end=0.02, dt=0.01, rtol=1e-5, atol=1e-6)
-    page = Opened(chromium, dap.view(result).save(tmp_path / "page.html"))
+    page = show(dap.view(result))
     calls = page.run("dap3d.app.stage.renderer.info.render.calls")
-    page.close()
-    assert page.complaints == []
     assert calls < 30
 
 
@@ -302,14 +284,12 @@ def test_a_notebook_shows_the_page_in_a_frame(chromium, four, tmp_path):
 
 
 @pytest.mark.long
-def test_a_single_instant_is_shown(chromium, tmp_path):
+def test_a_single_instant_is_shown(show):
     result = dap.simulate("fourbar3", t_end=0.0)
-    page = Opened(chromium, dap.view(result).save(tmp_path / "page.html"))
+    page = show(dap.view(result))
     page.page.press("#canvas", "Space")
     assert page.run("[dap3d.time, dap3d.playing]") == [0.0, False]
     np.testing.assert_allclose(page.run("dap3d.drawnAt('crank')"), result.r[0, 0], atol=1e-6)
-    page.close()
-    assert page.complaints == []
 
 
 def test_without_webgl_plots_and_tables_still_work(chromium, four_page):
@@ -328,14 +308,12 @@ def test_without_webgl_plots_and_tables_still_work(chromium, four_page):
 
 
 @pytest.mark.long
-def test_a_page_plays_as_it_opens(chromium, four, tmp_path):
+def test_a_page_plays_as_it_opens(show, chromium, four, tmp_path):
     """Where that is wished, and the system of its reader does not ask for less motion."""
     page = dap.view(four, play=True).save(tmp_path / "moving.html")
-    shown = Opened(chromium, page)
+    shown = show(page)
     shown.page.wait_for_function("window.dap3d.time > 0.1", timeout=20_000)
     assert shown.run("dap3d.playing")
-    shown.close()
-    assert shown.complaints == []
     calm = chromium.new_context(reduced_motion="reduce").new_page()
     calm.goto(page.resolve().as_uri())
     calm.wait_for_selector("html[data-ready]", state="attached", timeout=30_000)
@@ -366,21 +344,20 @@ def falling(nt):
     return dap.simulate(scene, t_end=1.0, dt=1.0 / (nt - 1))
 
 
-def curve_of(chromium, tmp_path, nt):
+def curve_of(show, nt):
     """What the only curve of a page is drawn by, and the words beside it."""
     result = falling(nt)
     page = dap.view(result, "stone.r.z")
-    shown = Opened(chromium, page.save(tmp_path / f"{nt}.html"))
+    shown = show(page)
     drawn = shown.run(DRAWN)
-    shown.close()
     grid = max(k for k, (kind, *_) in enumerate(drawn["kept"]) if kind == "m")
     return drawn["kept"][grid:], drawn["words"]
 
 
 @pytest.mark.long
-def test_a_dense_curve_is_drawn_in_the_order_of_time(chromium, tmp_path):
+def test_a_dense_curve_is_drawn_in_the_order_of_time(show):
     """A fall goes down alone: of some thousand instants no column goes up first."""
-    pieces, words = curve_of(chromium, tmp_path, 4001)
+    pieces, words = curve_of(show, 4001)
     height = [piece[-1] for piece in pieces]
     assert 100 < len(pieces) < 4001
     assert all(b >= a for a, b in pairwise(height))
@@ -388,9 +365,9 @@ def test_a_dense_curve_is_drawn_in_the_order_of_time(chromium, tmp_path):
 
 
 @pytest.mark.long
-def test_a_coarse_curve_is_smooth_between_its_instants(chromium, tmp_path):
+def test_a_coarse_curve_is_smooth_between_its_instants(show):
     """A parabola is a Bezier curve whose control points are where its tangents meet."""
-    pieces, _ = curve_of(chromium, tmp_path, 5)
+    pieces, _ = curve_of(show, 5)
     assert [piece[0] for piece in pieces] == ["m", "b", "b", "b", "b"]
     y = [pieces[0][-1], *(piece[-1] for piece in pieces[1:])]
     drop = (y[-1] - y[0]) / 16.0  # of the first quarter, in pixels
@@ -401,11 +378,11 @@ def test_a_coarse_curve_is_smooth_between_its_instants(chromium, tmp_path):
 
 
 @pytest.mark.long
-def test_a_curve_without_a_known_slope_keeps_its_shape(chromium, tmp_path):
+def test_a_curve_without_a_known_slope_keeps_its_shape(show):
     """Slopes are those of the figures, by SciPy; an interval with a cut is straight."""
     from scipy.interpolate import PchipInterpolator
 
-    page = Opened(chromium, dap.view(falling(5), "energy.total").save(tmp_path / "a.html"))
+    page = show(dap.view(falling(5), "energy.total"))
     t = np.array([0.0, 0.1, 0.3, 0.35, 0.5, 0.7, 1.0, 1.1])
     x = np.array([1.0, 3.0, 2.5, 2.5, 2.7, 4.0, -1.0, -1.2])
     script = """([t, x, cuts]) => {
@@ -427,4 +404,3 @@ def test_a_curve_without_a_known_slope_keeps_its_shape(chromium, tmp_path):
     np.testing.assert_allclose(
         before[1:], [*parts[0][1:], straight, *parts[1][1:]], rtol=1e-13, atol=1e-14
     )
-    page.close()

@@ -1,9 +1,5 @@
 """From MATLAB structures to a scene: every type, every field, what is defaulted and left out."""
 
-import json
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from support.matlab import write
@@ -419,26 +415,6 @@ def test_a_force_of_the_user_needs_its_file_and_its_bodies(mistakes, read):
     assert found == ["user_force.m: Bodies(7): there is no body 7; Bodies has 2"]
     _, report = read(user_force="x = 1;")
     assert told(report.unused) == ["user_force.m: no force is of type user: not used"]
-
-
-# ---------------------------------------------------------------- the extra
-
-
-def test_without_the_extra_the_error_says_which(tmp_path):
-    """In a process in which the grammar cannot be imported."""
-    write(tmp_path / "m")
-    script = (
-        "import sys; sys.modules['tree_sitter_matlab'] = None\n"
-        "from dap3d_core.cli import main; main(['import-matlab', 'm', '--json'])"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True
-    )
-    found = json.loads(done.stdout)
-    assert found["exit_code"] == 2
-    assert "pip install tree-sitter tree-sitter-matlab" in found["error"]
-    assert "Traceback" not in done.stderr
-    assert not (tmp_path / "scene.toml").exists()
 
 
 # ---------------------------------------------------------------- among the other formats

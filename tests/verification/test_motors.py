@@ -263,7 +263,7 @@ def test_a_linear_model_has_the_moment_as_an_input():
 )
 def test_inverse_dynamics_finds_what_a_motor_gives(kind, field, name, inertia):
     """Inertia times acceleration, of 0.5 sin 2 t; what a function gives is not found."""
-    scene, t = machine(kind), np.linspace(0.0, 1.0, 101)
+    scene, t = machine(kind), np.linspace(0.0, 0.5, 51)
     scene.add_force("motor", "motor", joint="guide", **{field: 3.0})
     motion = {"t": t, f"guide.{name}": 0.5 * np.sin(2.0 * t)}
     found = dap.inverse(scene, motion, "motor").record.actuation["motor"]

@@ -13,7 +13,13 @@ HEAVY = {"numpy", "scipy", "llvmlite", "matplotlib", "netCDF4", "xarray"}
 
 
 #: A run that needs nothing but a joint and a weight.
-PLAIN_RUN = "import dap3d_core as dap\ndap.simulate('pen1', t_end=0.04, dt=0.02)"
+PLAIN_RUN = "import dap3d_core as dap\nresult = dap.simulate('pen1', t_end=0.04, dt=0.02)"
+QUANTITIES = """result.quantity("cone.r.z")
+try:
+    result.quantity("cone")
+except KeyError:
+    pass"""
+STEPPED_RUN = "dap.start('pen1').step(0.01)"
 #: Runs of a model to which something may be added; tells its loops and sizes of arrays.
 SCENE = """
 import dap3d_core as dap
@@ -39,10 +45,12 @@ NEEDED = {
     "scene.add_shape('toothed-wheel', 's', body='upper', radius=0.1, width=0.1, teeth=9)": (
         {"dap3d_example.toothed_wheel", "dap3d_core.registry.extensions"}, ()),
 }  # fmt: skip
+#: What sets the inputs of a stepped run.
+SETTING_INPUTS = ("dap3d_core.simulation.control", "dap3d_core.simulation.stepwise",
+                  "dap3d_core.integrators.stepping.hold")  # fmt: skip
 #: Modules that neither model below needs, and parts of the core.
 NOWHERE = ("matplotlib", "netCDF4", "xarray", "rich", "dap3d_core.formulations.joint",
-           "dap3d_functions.grid", "dap3d_core.simulation.control", "scipy.optimize",
-           "dap3d_core.simulation.stepwise", "dap3d_core.integrators.stepping.hold",
+           "dap3d_functions.grid", "scipy.optimize", *SETTING_INPUTS,
            "dap3d_core.model.reaction_groups", "dap3d_core.interface.codegen.unknowns",
            "dap3d_core.kernels.eliminate_unknowns", "dap3d_core.scene.signals",
            "dap3d_core.interface.codegen.terms")  # fmt: skip
@@ -53,13 +61,22 @@ def imported(script):
     return set(run(f"{script}\n{MODULES}").splitlines()[-1].split())
 
 
+#: Who does not choose radau neither imports nor compiles it.
+RADAU = tuple(f"dap3d_core.{name}" for name in (
+    "formulations.stabilized_index2.jacobian", "formulations.stabilized_index2.stage_equations",
+    "integrators.radau.integration", "integrators.radau.step", "linear.lu"))  # fmt: skip
 #: All but those that are put together of others, whose places are products of rotations.
 LOADED = """import dap3d_core as dap
 for name in dap.shipped_models():
     if name not in ("sphere_box", "walker"):
         dap.load(name).to_toml()"""
-VIEWED = "import dap3d_core as dap; assert dap.view(dap.simulate('bodies2', t_end=0.04)).html"
-#: A script -> what it leaves alone, by the beginnings of names of modules.
+VIEWED = "assert dap.view(dap.simulate('bodies2', t_end=0.04)).html"
+GRID = """varied = {"forces.spring1.k": [10.0, 20.0]}
+dap.sweep("bodies2", varied, outputs="upper.r.x", t_end=0.04, threads=1)"""
+COMMAND = """from dap3d_core.cli import main
+assert main(["run", "pen1", "--t-end", "0.1", "-o", "run.nc", "-q"]) == 0"""
+#: Scripts, one after another in one process, and what they leave alone, by beginnings of names of
+#: modules: the package, its registry, scenes, results, runs, a page, a grid in memory, a command.
 LEFT_ALONE = {
     "import dap3d_core": (*HEAVY, "rich", "click", "pluggy", "dap3d_joints", "dap3d_forces",
                           "dap3d_functions"),
@@ -71,17 +88,31 @@ LEFT_ALONE = {
     PLAIN_RUN: ("dap3d_formats", "dap3d_core.formats", "dap3d_core.interface.formats", "xml",
                 "pyexpat", "dap3d_core.study", "dap3d_core.simulation.kinematics",
                 "scipy.integrate", "dap3d_core.simulation.redundancy.freedoms",
-                "numpy.ma.", "uuid"),
+                "numpy.ma.", "uuid", *RADAU, *SETTING_INPUTS),
+    QUANTITIES: ("dap3d_core.scene.expressions", "graphlib"),
+    STEPPED_RUN: ("dap3d_core.scene.signals", "dap3d_core.interface.codegen.terms"),
     # a page of a scene without meshes: nothing for plots in files, or for meshes
     VIEWED: ("matplotlib", "trimesh", "netCDF4", "xarray", "rich", "click"),
+    # nothing that draws samples, fits, speaks to a cluster or reads measured data
+    GRID: ("distributed", "scipy.stats", "scipy.optimize", "matplotlib", "dap3d_core.study.fit",
+           "dap3d_core.study.workers.dask_cluster", "dap3d_core.study.workers.environment",
+           "dap3d_core.result.quantities.measured_data"),
+    # no other analysis, nothing that these need, no starts from results
+    COMMAND: (*(f"dap3d_core.simulation.{name}" for name in (
+                  "equilibrium", "kinematics", "linearization", "initial.start_state")),
+              "dap3d_core.kernels.compiler.derivatives",
+              "dap3d_core.interface.codegen.loop_derivatives", "scipy.sparse.linalg", "control"),
 }  # fmt: skip
 
 
-@pytest.mark.every(3)
-@pytest.mark.parametrize(("script", "others"), LEFT_ALONE.items(), ids=range(len(LEFT_ALONE)))
-def test_a_script_leaves_alone_what_it_does_not_need(script, others):
-    """The package, its registry, scenes, results, a run, a page."""
-    assert not [m for m in imported(script) if m.startswith(tuple(others))]
+def test_a_script_leaves_alone_what_it_does_not_need(tmp_path):
+    """And a stepped run loads what sets its inputs."""
+    scripts = "\n".join(f"{script}\n{MODULES}" for script in LEFT_ALONE)
+    said = run(scripts, cwd=tmp_path).splitlines()
+    found = dict(zip(LEFT_ALONE, (set(line.split()) for line in said), strict=True))
+    for script, others in LEFT_ALONE.items():
+        assert not [m for m in found[script] if m.startswith(tuple(others))], script
+    assert found[STEPPED_RUN] >= set(SETTING_INPUTS)
 
 
 def told(model, added="", method="auto"):
@@ -133,14 +164,6 @@ def test_joint_coordinates_are_imported_where_a_scene_takes_them():
     assert "dap3d_core.formulations.joint_loops" not in found  # a tree keeps no rows
 
 
-def test_a_stepped_run_loads_what_sets_its_inputs():
-    names = {"dap3d_core.simulation.control", "dap3d_core.simulation.stepwise",
-             "dap3d_core.integrators.stepping.hold"}  # fmt: skip
-    found = imported("import dap3d_core as dap\ndap.start('pen1').step(0.01)")
-    assert names <= found
-    assert not found & {"dap3d_core.scene.signals", "dap3d_core.interface.codegen.terms"}
-
-
 @pytest.mark.slow
 def test_lanes_are_imported_by_long_studies():
     """Short ones bring in nothing of them."""
@@ -190,34 +213,3 @@ def test_a_force_without_a_factor_has_the_loop_of_one_that_knows_of_none(keyword
     assert type_info.layout.functions == ()
     assert stride(type_info) == len(type_info.layout.slots) + len(type_info.layout.others)
     assert "F[" not in "\n".join(write(type_info, "wrench").lines)
-
-
-@pytest.mark.slow
-def test_a_run_needs_no_analysis_and_no_other_start(tmp_path):
-    """``dap3d run`` imports no other analysis, nothing that these need, no starts from results."""
-    found = imported(
-        "from dap3d_core.cli import main\n"
-        f"main(['run', 'pen1', '--t-end', '0.1', '-o', {str(tmp_path / 'r.nc')!r}, '-q'])"
-    )
-    assert "dap3d_core.simulation.run" in found
-    floors = ("equilibrium", "kinematics", "linearization", "initial.start_state")
-    core = (*(f"simulation.{name}" for name in floors), "kernels.compiler.derivatives",
-            "interface.codegen.loop_derivatives")  # fmt: skip
-    others = (*(f"dap3d_core.{name}" for name in core), "scipy.sparse.linalg", "control")
-    assert not {m for m in found if m.startswith(others)}
-
-
-@pytest.mark.slow
-def test_a_grid_in_memory_needs_no_samples_no_cluster_and_no_packs_of_its_own():
-    """What draws samples, fits, speaks to a cluster or draws pictures is left alone by a grid."""
-    script = (
-        "import dap3d_core as dap\n"
-        "asked = {'forces.spring1.k': [10.0, 20.0]}\n"
-        "dap.sweep('bodies2', asked, outputs='upper.r.x', t_end=0.04, threads=1)\n"
-    )
-    found = imported(script)
-    heavy = {"distributed", "scipy.stats", "scipy.optimize", "matplotlib"}
-    assert not found & heavy
-    ours = {name.rpartition(".")[2] for name in found if name.startswith("dap3d_core.study.")}
-    assert not ours & {"dask_cluster", "environment", "fit", "identifiability"}
-    assert "dap3d_core.result.quantities.measured_data" not in found

@@ -70,33 +70,35 @@ def test_offered_names_exist(result):
         find(result, "cone.rr")
 
 
+def offered(*words):
+    """Kinds and words offered in this process for a command line whose last word is incomplete."""
+    complete = ShellComplete(dap3d, {}, "dap3d", "_DAP3D")
+    return [(item.type, item.value) for item in complete.get_completions([*words[:-1]], words[-1])]
+
+
+def completions(*words):
+    return [word for _, word in offered(*words)]
+
+
 @pytest.mark.slow
 @in_another_process
 def test_a_shell_gets_words_and_their_types(folder):
-    def offered(*words):
-        line = " ".join(["dap3d", *words])
-        variables = {"COMP_WORDS": line, "COMP_CWORD": str(len(words)),
-                     "_DAP3D_COMPLETE": "bash_complete"}  # fmt: skip
-        script = "from dap3d_core.cli import main; main()"
-        done = subprocess.run([sys.executable, "-c", script], cwd=folder, text=True,
-                              env=os.environ | variables, capture_output=True)  # fmt: skip
-        assert done.stderr == ""
-        return [tuple(item.split(",", 1)) for item in done.stdout.splitlines()]
+    variables = {"COMP_WORDS": "dap3d plot a.nc cone.r.", "COMP_CWORD": "3",
+                 "_DAP3D_COMPLETE": "bash_complete"}  # fmt: skip
+    script = "from dap3d_core.cli import main; main()"
+    done = subprocess.run([sys.executable, "-c", script], cwd=folder, text=True,
+                          env=os.environ | variables, capture_output=True)  # fmt: skip
+    assert done.stderr == ""
+    assert done.stdout.splitlines() == [f"plain,cone.r.{part}" for part in ("x", "y", "z", "norm")]
 
-    assert offered("plot", "a.nc", "cone.r.") == [
-        ("plain", f"cone.r.{part}") for part in ("x", "y", "z", "norm")
-    ]
+
+def test_words_and_their_types(folder, monkeypatch):
+    monkeypatch.chdir(folder)
     assert ("plain", "energy.total") in offered("plot", "a.nc", "cone.r", "--x", "en")
     assert offered("plot", "a.") == [("file", "a.")]
     assert offered("plot", "gone.nc", "cone") == [("file", "cone")]
     assert ("plain", "fourbar3") in offered("run", "four")
     assert ("plain", "animate") in offered("an")
-
-
-def completions(*words):
-    """Words offered in this process for a command line whose last word is incomplete."""
-    complete = ShellComplete(dap3d, {}, "dap3d", "_DAP3D")
-    return [item.value for item in complete.get_completions(list(words[:-1]), words[-1])]
 
 
 def test_parameters_of_a_model():

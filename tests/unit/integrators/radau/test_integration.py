@@ -1,13 +1,10 @@
 """Radau on the equations of motion: tangent, chunks, motions, refusals."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from support import mechanisms, problems
 from support.internals import compiled, store_reference_pivots
-from support.plain import in_another_process, jit_is_on, long_in_plain_python
+from support.plain import jit_is_on, long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.formulations.stabilized_index2.stage_equations import evaluate_stage, keep_frames
@@ -163,21 +160,6 @@ def test_body_without_joints():
     result = dap.simulate(scene, t_end=1.0, dt=1.0, integrator="radau", rtol=1e-10, atol=1e-12)
     w = (0.50197928606713736, 2.1789944461516021, 0.025711240346541824)
     assert result.wp[-1, 0] == pytest.approx(w, abs=1e-8)
-
-
-@pytest.mark.slow
-@in_another_process
-def test_other_integrators_load_nothing_of_it():
-    """Who does not choose radau neither imports nor compiles it."""
-    code = (
-        "import sys, dap3d_core as dap\n"
-        "dap.simulate('pen1', t_end=0.01, dt=0.01)\n"
-        "for name in ('formulations.stabilized_index2.jacobian', 'linear.lu',\n"
-        "             'formulations.stabilized_index2.stage_equations',\n"
-        "             'integrators.radau.integration', 'integrators.radau.step'):\n"
-        "    assert 'dap3d_core.' + name not in sys.modules, name\n"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=300)
 
 
 @pytest.mark.parametrize("part", [2e-4, 1e-3, 1e-2])

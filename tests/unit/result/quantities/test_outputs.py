@@ -6,8 +6,6 @@ import attrs
 import numpy as np
 import pytest
 from support.internals import columns_of, dataset_to_write, selected, write_csv
-from support.plain import in_another_process
-from support.process import run
 from support.results import ARM, MASS, RATE, circling
 
 import dap3d_core as dap
@@ -175,19 +173,3 @@ def test_sweeps_reduce_outputs_as_single_runs_do(tmp_path):
         )
         np.testing.assert_array_equal(sweep["masked:end"][k], 1.0)
         np.testing.assert_array_equal(sweep["height:series"][k], value["height"])
-
-
-@in_another_process
-def test_scenes_without_outputs_import_nothing_of_them():
-    script = """
-import sys
-import dap3d_core as dap
-result = dap.simulate("pen1", t_end=0.01, dt=0.01)
-result.quantity("cone.r.z")
-try:
-    result.quantity("cone")
-except KeyError:
-    pass
-print([name for name in sys.modules if "scene.expressions" in name or name == "graphlib"])
-"""
-    assert run(script).strip() == "[]"
