@@ -209,6 +209,7 @@ FMI_API S FMI(ExitInitializationMode)(I instance)
     start(F->model);
     if (integer_of(F->model)[I_status] > FINISHED)
         return stopped(F->model), fmi_failed(F, fmi_error, dap3d_message(F->model));
+    F->model->is_under_way = 1;
     return F->is_initialised = true, fmi_ok;
 }
 
