@@ -91,7 +91,7 @@ static fmi_status fmi_setup(fmu *f, double start, bool has_stop, double stop)
 {
     if (start != 0.0)
         return fmi_failed(f, fmi_error, "the start time of the model is 0");
-    f->model->t_end = f->model->span = has_stop && stop > 0.0 ? stop : HORIZON;
+    f->model->t_end = f->model->span = has_stop && stop > 0.0 && stop <= LARGEST ? stop : HORIZON;
     for (int k = 0; k < INTEGRATIONS; k++)
         numbers(f->model, integrations[k].times)[2] = f->model->t_end;
     set_stops(f->model);
