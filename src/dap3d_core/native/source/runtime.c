@@ -32,7 +32,7 @@ struct dap3d_model {
     int64_t first_rejected;
     int64_t which;           /* the integration that the run is in */
     int64_t is_ahead;        /* steps have gone beyond the present time, which is interpolated */
-    int64_t is_changed;      /* inputs have changed since the last step */
+    double held[INPUTS + 1]; /* inputs of the last step */
     int64_t jump_count;
 #if CONTACTS
     int64_t failure;         /* why contacts have no motion to go on with (decide.py) */
@@ -115,6 +115,18 @@ static void set_stops(dap3d_model *m)
     }
 }
 
+/* Hold the inputs as they are; whether they are others than before. */
+static int take_inputs(dap3d_model *m)
+{
+    int differ = 0;
+    for (int v = 1; v <= INPUTS; v++) { /* behind time */
+        double value = *numbers(m, variables[v].first);
+        differ |= value != m->held[v];
+        m->held[v] = value;
+    }
+    return differ;
+}
+
 static void begin(dap3d_model *m, double t_end)
 {
     const int64_t *next = content;
@@ -126,6 +138,7 @@ static void begin(dap3d_model *m, double t_end)
     m->t_end = t_end;
     m->first_h = -1.0;
     m->span = t_end;
+    take_inputs(m);
     for (int k = 0; k < INTEGRATIONS; k++) {
         double *times = numbers(m, integrations[k].times);
         times[0] = 0.0;
@@ -270,11 +283,9 @@ int dap3d_set(dap3d_model *m, int v, double x)
     if (kind == DAP3D_INPUT) {
         start(m);
         double *value = numbers(m, variables[v].first);
-        if (*value != x) {
-            *value = x;
-            m->is_changed = 1;
+        if (*value != x)
             m->has_row = 0;
-        }
+        *value = x;
         return DAP3D_OK;
     }
     int k = variables[v].first, is_low = x < places[k].low;
@@ -904,12 +915,9 @@ static int jump(dap3d_model *m)
 /* As Hold.to: integrate with steps that end at a time. */
 static int hold_to(dap3d_model *m, double end)
 {
-    if (m->is_changed) {
-        int result = jump(m);
-        m->is_changed = 0;
-        if (result != DAP3D_OK)
-            return result;
-    }
+    int result = take_inputs(m) ? jump(m) : DAP3D_OK;
+    if (result != DAP3D_OK)
+        return result;
     m->first_h = real_of(m)[R_h];
     m->first_rejected = integer_of(m)[I_rejected_count];
     integer_of(m)[I_row_count] = 0;
