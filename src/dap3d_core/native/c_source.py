@@ -8,13 +8,10 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.assembly.arrays import EVEN, WEAK
 from dap3d_core.assembly.metric import METRIC_WIDTH
 from dap3d_core.formulations import REPORT
-from dap3d_core.formulations.arrays import UNEVEN, VERY_UNEVEN
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
 from dap3d_core.formulations.jumps.jump_arrays import CROSSING, SIDE, JumpArrays
-from dap3d_core.integrators.moreau.arrays import LIGHT
 from dap3d_core.integrators.moreau.step import START_ALONE
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration_state import IntegrationState
@@ -24,6 +21,7 @@ from dap3d_core.native.run.directions import Directions, PairEntry, PairUnit
 from dap3d_core.native.run.elements import Elements
 from dap3d_core.native.run.limits import OPEN, Limits
 from dap3d_core.native.run.outputs import Output
+from dap3d_core.native.run.parameters import mass_numbers
 from dap3d_core.native.run.prepared import Advance, ContactCode, PreparedRun
 from dap3d_core.simulation.events import contact_jumps
 from dap3d_core.study.batch import initial_state
@@ -465,7 +463,6 @@ def _start(prepared: PreparedRun, variables: Sequence[Variable]) -> list[str]:
     if not fixed or prepared.start is None:
         return ["#define FIXED 0"]
     start, system, place = prepared.start, prepared.evaluator.system, prepared.image.at
-    model = prepared.evaluator.model
     body = place(system.body)
     owned = {(w - body) // BODY_WIDTH for v in fixed for w, _ in v.words
              if 0 <= w - body < system.body.size}  # fmt: skip
@@ -481,21 +478,9 @@ def _start(prepared: PreparedRun, variables: Sequence[Variable]) -> list[str]:
         "BEGIN": place(start.functions),
         "METRIC": place(system.metric),
         "METRIC_WIDTH": METRIC_WIDTH,
-        "ELEMENT_STATES": len(model.initial_states),
-        "IS_EVEN": place(system.settings) + EVEN,
-        "IS_WEAK": place(system.settings) + WEAK,
-        "UNEVEN": UNEVEN,
-        "VERY_UNEVEN": VERY_UNEVEN,
-        "EXTENT": "INFINITY" if model.extent == model.gyration else model.extent.hex(),
-        "ARM": model.arm.hex(),
+        "ELEMENT_STATES": len(prepared.evaluator.model.initial_states),
+        **mass_numbers(prepared),
     }
-    if prepared.steps_contacts:
-        steps = prepared.advances[0].arguments[1]
-        for name in ("mass", "mass_inverse", "Jp", "Jp_inverse", "carried", "row_start", "row_body"):
-            array = getattr(steps, name)
-            numbers[name.upper()] = place(array) if array.size else 0
-        numbers["LIGHT_COUNT"] = place(steps.integer) + steps.indices("integer")["light_count"]
-        numbers |= {"LIGHT": LIGHT, "JOINT_ROWS": len(steps.row_start) - 1}
     lines = _defined(numbers)
     lines += _table("static const int heavy[]", map(str, sorted(owned) or [0]))
     moving = [str(k) for k, v in enumerate(variables) if v.kind == "fixed" and v.first]

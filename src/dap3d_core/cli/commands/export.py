@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dap3d_core.cli.framework import options
-from dap3d_core.cli.framework.command import command
+from dap3d_core.cli.framework.command import Option, command
 from dap3d_core.cli.process.exit_codes import DONE, Refused, refusing
 from dap3d_core.settings import StepSettings
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
 
 #: Options of the formats c and fmu alone, by parameter.
-NATIVE_OPTIONS = {
+NATIVE_OPTIONS: dict[str, Option] = {
     "quantities": click.option(
         "--quantity", "quantities", multiple=True, metavar="NAME",
         help="c, fmu: an output, such as load.r.z, once for each; those of the MODEL by default."),

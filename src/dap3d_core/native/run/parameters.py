@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.assembly.arrays import EVEN, WEAK
+from dap3d_core.formulations.arrays import UNEVEN, VERY_UNEVEN
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS
+from dap3d_core.integrators.moreau.arrays import LIGHT
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.kernels.array_types import Floats
@@ -35,6 +37,8 @@ DERIVED = frozenset(
 )
 #: Numbers of the settings that follow from masses and inertias.
 MASS_FLAGS = np.array([EVEN, WEAK])
+#: Arrays of steps of contacts that masses are put into.
+OF_STEPS = ("mass", "mass_inverse", "Jp", "Jp_inverse", "carried", "row_start", "row_body")
 #: The remedy for parameters that cannot be set.
 EXPORT_EACH = "export a model for each value"
 #: Two corrections of a start agree to this part of the length of the scene.
@@ -205,3 +209,26 @@ def _is_assembled_alike(other: PreparedRun) -> bool:
             return False
     size = max(1.0, float(np.abs(y).max(initial=0.0)))
     return bool(np.abs(found - y).max(initial=0.0) <= ALIKE * size)
+
+
+def mass_numbers(prepared: PreparedRun) -> dict[str, Any]:
+    """Numbers and places in the memory, by their names in C, of what follows from masses."""
+    evaluator, place = prepared.evaluator, prepared.image.at
+    model, settings = evaluator.model, place(evaluator.system.settings)
+    found: dict[str, Any] = {
+        "IS_EVEN": settings + EVEN,
+        "IS_WEAK": settings + WEAK,
+        "UNEVEN": UNEVEN,
+        "VERY_UNEVEN": VERY_UNEVEN,
+        "EXTENT": "INFINITY" if model.extent == model.gyration else model.extent.hex(),
+        "ARM": model.arm.hex(),
+    }
+    if not prepared.steps_contacts:
+        return found
+    steps = prepared.advances[0].arguments[1]
+    for name in OF_STEPS:
+        array = getattr(steps, name)
+        found[name.upper()] = place(array) if array.size else 0
+    count = place(steps.integer) + steps.indices("integer")["light_count"]
+    rows = len(steps.row_start) - 1
+    return found | {"LIGHT_COUNT": count, "LIGHT": LIGHT, "JOINT_ROWS": rows}

@@ -83,10 +83,10 @@ def test_masses_may_differ_far_more_or_less_than_in_the_scene(
 
 @pytest.mark.slow
 def test_what_is_read_before_a_run_matters_not(tmp_path):
-    """A ball at rest on the floor, thrown at it: it bounces with what is set, read before or not."""
+    """A ball thrown at the floor that it lies on bounces with what is set."""
     scene = bouncing()
     scene.bodies["ball"].r, scene.bodies["ball"].r_dot = (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)
-    made, library = exported(
+    _, library = exported(
         scene, tmp_path, outputs=["ball.rd.z"], parameters=["forces.floor.e", "bodies.ball.mass"]
     )
     run = library.start(1.0)
@@ -103,7 +103,7 @@ def test_what_is_read_before_a_run_matters_not(tmp_path):
 
 @pytest.mark.slow
 def test_inputs_and_parameters_are_set_in_any_order(tmp_path):
-    """A disk of 1.17 kg m^2 about its hub is given 2 rad/s at once: its work is its energy, in J."""
+    """A disk of 1.17 kg m^2 about its hub is given 2 rad/s at once: its work is its energy."""
     scene = dap.Scene(name="turntable")
     scene.add_body("disk", mass=2.0, Jp=(0.5, 0.5, 0.9), r=(0.3, 0, 0))
     scene.add_input("speed", value=0.0)
