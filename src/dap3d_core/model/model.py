@@ -281,12 +281,13 @@ class Model(Bodies):
         extent = float(np.linalg.norm(np.max(points, axis=0) - np.min(points, axis=0)))
         if extent > EXTENT * float(np.max(np.abs(points))):
             return extent
-        return self._gyration
+        return self.gyration
 
     @cached_property
-    def _gyration(self) -> float:
+    def gyration(self) -> float:
         """The largest radius of gyration of a body, m."""
-        return float(np.sqrt(np.max(np.linalg.norm(self.Jp, ord=2, axis=(1, 2)) / self.mass)))
+        moments = np.linalg.norm(self.Jp, ord=2, axis=(1, 2))
+        return float(np.sqrt(np.max(moments / self.mass, initial=0.0)))
 
     @cached_property
     def part_size(self) -> float:
@@ -294,10 +295,13 @@ class Model(Bodies):
 
         A chain of a thousand links has errors as one of ten.
         """
-        if not self.body_count:
-            return self.extent
+        return min(self.extent, max(self.arm, self.gyration)) if self.body_count else self.extent
+
+    @cached_property
+    def arm(self) -> float:
+        """The largest distance of a point of a body from its centre of mass, m."""
         arms = np.linalg.norm(self.point_local[self.point_body > 0], axis=1)
-        return min(self.extent, max(float(np.max(arms, initial=0.0)), self._gyration))
+        return float(np.max(arms, initial=0.0))
 
     @cached_property
     def length(self) -> float:

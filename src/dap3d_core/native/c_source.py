@@ -21,6 +21,7 @@ from dap3d_core.native.run.directions import Directions, PairEntry, PairUnit
 from dap3d_core.native.run.elements import Elements
 from dap3d_core.native.run.limits import OPEN, Limits
 from dap3d_core.native.run.outputs import Output
+from dap3d_core.native.run.parameters import mass_numbers
 from dap3d_core.native.run.prepared import Advance, ContactCode, PreparedRun
 from dap3d_core.simulation.events import contact_jumps
 from dap3d_core.study.batch import initial_state
@@ -478,12 +479,8 @@ def _start(prepared: PreparedRun, variables: Sequence[Variable]) -> list[str]:
         "METRIC": place(system.metric),
         "METRIC_WIDTH": METRIC_WIDTH,
         "ELEMENT_STATES": len(prepared.evaluator.model.initial_states),
+        **mass_numbers(prepared),
     }
-    first = prepared.advances[0]
-    if prepared.steps_contacts:
-        steps = first.arguments[1]
-        for name in ("mass", "mass_inverse", "Jp", "Jp_inverse"):
-            numbers[name.upper()] = place(getattr(steps, name))
     lines = _defined(numbers)
     lines += _table("static const int heavy[]", map(str, sorted(owned) or [0]))
     moving = [str(k) for k, v in enumerate(variables) if v.kind == "fixed" and v.first]

@@ -6,7 +6,7 @@ import shutil
 import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import attrs
 
@@ -30,6 +30,7 @@ from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.extensions import extensions
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import Scene, SceneError, load
+from dap3d_core.settings import StepSettings
 from dap3d_core.study.parameters import SceneParameter, parameters_named
 
 #: Formats, with the suffix of their files; "c" is a folder.
@@ -322,17 +323,11 @@ def export_model(
     platforms: Sequence[str] | None = None,
     fmi: int = 3,
     t_end: float | None = None,
-    method: str | None = None,
-    integrator: str | None = None,
-    rtol: float | None = None,
-    atol: float | None = None,
-    step: float | None = None,
-    contact: str | None = None,
-    contact_step: float | None = None,
     strict: bool = False,
     force: bool = False,
     allow_code: bool = False,
     registry: Registry | None = None,
+    **settings: Unpack[StepSettings],
 ) -> ExportReport | NativeExport:
     """Write a scene as a model of another program, or as one that runs without Python.
 
@@ -346,9 +341,11 @@ def export_model(
             where it has none the motion of its bodies.
         parameters: numbers that may be set, such as "forces.spring.k".
         platforms: "linux", "windows", "macos", "linux-arm64" ...; by default this one.
-        fmi: version of an FMU, 3 or 2. t_end, ..., contact_step: settings as of ``simulate``.
+        fmi: version of an FMU, 3 or 2.
+        t_end: of "fmu" and "c": final time of a run that is given none, s.
         strict, force: refuse to leave something out; overwrite what exists.
         allow_code, registry: as of ``compile``.
+        **settings: of "fmu" and "c": how a run takes its steps, as of ``simulate``.
 
     Raises:
         SceneError: the scene is invalid, or cannot be exported so: what, and why.
@@ -359,8 +356,7 @@ def export_model(
     kind = format or _format_of(path)
     chosen: dict[str, Any] = {
         "outputs": outputs, "parameters": parameters, "platforms": platforms, "t_end": t_end,
-        "method": method, "integrator": integrator, "rtol": rtol, "atol": atol, "step": step,
-        "contact": contact, "contact_step": contact_step,
+        **settings,
     }  # fmt: skip
     given = {name: value for name, value in chosen.items() if value is not None}
     if kind not in NATIVE_FORMATS:

@@ -175,6 +175,14 @@ def test_wrong_use_is_an_error_and_changes_nothing(tmp_path, fmi):
     fmu.reset()
     with pytest.raises(fmpy.fmi1.FMICallException):  # before it is initialised
         fmu.doStep(0.0, 0.1)
+    if fmi == 2:
+        fmu.setupExperiment(startTime=0.0, stopTime=np.inf)  # as of a run whose end is not known
+        fmu.enterInitializationMode()
+    else:
+        fmu.enterInitializationMode(startTime=0.0, stopTime=np.inf)
+    fmu.exitInitializationMode()
+    fmu.doStep(0.0, 0.5)
+    assert get([at["cone.r.z"]]) == pytest.approx(before, rel=1e-12)
     fmu.freeInstance()
 
 

@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dap3d_core.cli.framework import options
-from dap3d_core.cli.framework.command import command
+from dap3d_core.cli.framework.command import Option, command
 from dap3d_core.cli.process.exit_codes import DONE, Refused, refusing
+from dap3d_core.settings import StepSettings
 
 if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
 
 #: Options of the formats c and fmu alone, by parameter.
-NATIVE_OPTIONS = {
+NATIVE_OPTIONS: dict[str, Option] = {
     "quantities": click.option(
         "--quantity", "quantities", multiple=True, metavar="NAME",
         help="c, fmu: an output, such as load.r.z, once for each; those of the MODEL by default."),
@@ -29,6 +30,7 @@ NATIVE_OPTIONS = {
         "default."),
     "fmi": click.option("--fmi", type=click.Choice(["3", "2"]), default=None,
                         help="fmu: version of the standard; 3 by default."),
+    **{name: options.SETTING_OPTIONS[name] for name in ("t_end", *StepSettings.__annotations__)},
 }  # fmt: skip
 
 
@@ -66,13 +68,15 @@ def export(
 
     urdf and mjcf are models: bodies, joints, loops, and what acts in joints, of a MODEL in the
     place of RESULT. What they cannot say is refused, or listed. c (a library for C) and fmu (a
-    model for co-simulation and model exchange) run without Python, with the numbers of dap3d run.
+    model for co-simulation and model exchange) run without Python, with the numbers of dap3d run;
+    of these alone are the settings of a run, from --t-end on, by default those of the MODEL.
 
     \b
     dap3d export pen1.nc --format vtk
     dap3d export pen1.nc -o pen1.glb --fps 60
     dap3d export fourbar4 --format mjcf
     dap3d export crane -o crane.fmu --platform linux --platform windows
+    dap3d export pen1 -o pen1-c --integrator rk4 --step 0.001
 
     Ctrl-C leaves no file.
     """
@@ -83,8 +87,9 @@ def export(
         return _export_native(result, kind, output, strict=strict, force=force,
                               allow_code=allow_code, **of_native)  # fmt: skip
     words = {"quantities": "--quantity", "parameters": "--parameter", "platforms": "--platform"}
+    words |= options.SETTINGS
     for name, value in of_native.items():
-        if value:
+        if value not in (None, ()):
             raise Refused(f"{words.get(name, f'--{name}')} is of formats c and fmu")
     kind = kind or _model_format(output)
     if kind is not None and kind not in result_exporters():
@@ -202,6 +207,7 @@ def _export_native(
     strict: bool,
     force: bool,
     allow_code: bool,
+    **settings: Any,
 ) -> int:
     """Write a model as a C library or an FMU."""
     import dap3d_core as dap
@@ -218,8 +224,10 @@ def _export_native(
         made: Any = dap.export_model(
             scene, target, format=kind, outputs=list(quantities) or None,
             parameters=list(parameters), platforms=list(platforms), fmi=int(fmi or 3),
-            strict=strict, force=force, allow_code=allow_code,
+            strict=strict, force=force, allow_code=allow_code, **settings,
         )  # fmt: skip
+    except dap.SceneError as error:
+        raise options.in_options(error, options.of_settings(settings)) from error
     except FileExistsError as error:
         raise Refused(f"{target} exists; --force overwrites it") from error
     except OSError as error:

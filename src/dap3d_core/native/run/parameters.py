@@ -12,7 +12,10 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.assembly.arrays import EVEN, WEAK
+from dap3d_core.formulations.arrays import UNEVEN, VERY_UNEVEN
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS
+from dap3d_core.integrators.moreau.arrays import LIGHT
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.kernels.array_types import Floats
@@ -29,7 +32,13 @@ from dap3d_core.study.parameters import SceneParameter, with_values
 TRIALS = (1.001, 0.9975), (1.001, 1.0025), (0.999, 0.9975)
 TRIALS_OF_ZERO = (1.001, 0.9975), (1e-3, 2.5e-3), (-1e-3, -2.5e-3)
 #: What follows from other numbers at the start of a run.
-DERIVED = frozenset(("metric", "smallest", "F", "start", "0.mass_inverse", "0.Jp_inverse"))
+DERIVED = frozenset(
+    ("metric", "flags", "smallest", "F", "start", "0.mass_inverse", "0.Jp_inverse", "0.carried")
+)
+#: Numbers of the settings that follow from masses and inertias.
+MASS_FLAGS = np.array([EVEN, WEAK])
+#: Arrays of steps of contacts that masses are put into.
+OF_STEPS = ("mass", "mass_inverse", "Jp", "Jp_inverse", "carried", "row_start", "row_body")
 #: The remedy for parameters that cannot be set.
 EXPORT_EACH = "export a model for each value"
 #: Two corrections of a start agree to this part of the length of the scene.
@@ -156,9 +165,11 @@ def _numbers(prepared: PreparedRun) -> Iterator[tuple[str, Any, Any]]:
     from dap3d_core.formulations.programs.symbolic_arrays import constants
 
     evaluator = prepared.evaluator
-    arrays = dict(evaluator.system.walk())
+    system = evaluator.system
+    arrays = dict(system.walk())
+    yield "flags", system.settings, MASS_FLAGS
     for name, places in constants(evaluator):
-        yield name, arrays[name], places
+        yield name, arrays[name], np.setdiff1d(places, MASS_FLAGS) if name == "settings" else places
     if prepared.start is not None:
         given = prepared.start.arrays.given
         yield "given", given, np.arange(given.size)
@@ -174,8 +185,12 @@ def _numbers(prepared: PreparedRun) -> Iterator[tuple[str, Any, Any]]:
             array = getattr(work, name)
             yield f"{k}.{name}", array, np.arange(array.size)
         if one.completes is not None:  # masses, shapes, materials
-            for name, array in one.arguments[1].walk():
-                yield f"{k}.{name}", array, np.arange(array.size)
+            steps = one.arguments[1]
+            places = np.arange(steps.integer.size) != steps.indices("integer")["light_count"]
+            yield f"{k}.counts", steps.integer, np.flatnonzero(places)
+            for name, array in steps.walk():
+                if array is not steps.integer:
+                    yield f"{k}.{name}", array, np.arange(array.size)
 
 
 @IGNORE_FLOAT_ERRORS
@@ -194,3 +209,26 @@ def _is_assembled_alike(other: PreparedRun) -> bool:
             return False
     size = max(1.0, float(np.abs(y).max(initial=0.0)))
     return bool(np.abs(found - y).max(initial=0.0) <= ALIKE * size)
+
+
+def mass_numbers(prepared: PreparedRun) -> dict[str, Any]:
+    """Numbers and places in the memory, by their names in C, of what follows from masses."""
+    evaluator, place = prepared.evaluator, prepared.image.at
+    model, settings = evaluator.model, place(evaluator.system.settings)
+    found: dict[str, Any] = {
+        "IS_EVEN": settings + EVEN,
+        "IS_WEAK": settings + WEAK,
+        "UNEVEN": UNEVEN,
+        "VERY_UNEVEN": VERY_UNEVEN,
+        "EXTENT": "INFINITY" if model.extent == model.gyration else model.extent.hex(),
+        "ARM": model.arm.hex(),
+    }
+    if not prepared.steps_contacts:
+        return found
+    steps = prepared.advances[0].arguments[1]
+    for name in OF_STEPS:
+        array = getattr(steps, name)
+        found[name.upper()] = place(array) if array.size else 0
+    count = place(steps.integer) + steps.indices("integer")["light_count"]
+    rows = len(steps.row_start) - 1
+    return found | {"LIGHT_COUNT": count, "LIGHT": LIGHT, "JOINT_ROWS": rows}

@@ -57,7 +57,7 @@ def _require_bodies(evaluator: Evaluator, what: str) -> None:
         raise refusal(
             f"{what}, and Python alone brings that into joint coordinates (method joint, which "
             "auto takes for large trees)",
-            'set method = "lsq" in [simulation], or give it to export_model',
+            'set method = "lsq" in [simulation], or export with it (--method lsq)',
         )
 
 

@@ -91,7 +91,7 @@ static fmi_status fmi_setup(fmu *f, double start, bool has_stop, double stop)
 {
     if (start != 0.0)
         return fmi_failed(f, fmi_error, "the start time of the model is 0");
-    f->model->t_end = f->model->span = has_stop && stop > 0.0 ? stop : HORIZON;
+    f->model->t_end = f->model->span = has_stop && stop > 0.0 && stop <= LARGEST ? stop : HORIZON;
     for (int k = 0; k < INTEGRATIONS; k++)
         numbers(f->model, integrations[k].times)[2] = f->model->t_end;
     set_stops(f->model);
@@ -209,6 +209,7 @@ FMI_API S FMI(ExitInitializationMode)(I instance)
     start(F->model);
     if (integer_of(F->model)[I_status] > FINISHED)
         return stopped(F->model), fmi_failed(F, fmi_error, dap3d_message(F->model));
+    F->model->is_under_way = 1;
     return F->is_initialised = true, fmi_ok;
 }
 

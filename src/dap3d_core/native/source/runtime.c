@@ -32,7 +32,7 @@ struct dap3d_model {
     int64_t first_rejected;
     int64_t which;           /* the integration that the run is in */
     int64_t is_ahead;        /* steps have gone beyond the present time, which is interpolated */
-    int64_t is_changed;      /* inputs have changed since the last step */
+    double held[INPUTS + 1]; /* inputs of the last step */
     int64_t jump_count;
 #if CONTACTS
     int64_t failure;         /* why contacts have no motion to go on with (decide.py) */
@@ -43,6 +43,7 @@ struct dap3d_model {
 #endif
     int64_t is_other;        /* 1: parameters that the start depends on are set; 2: it moves */
     int64_t has_begun;       /* what touches at the start has jumped */
+    int64_t is_under_way;    /* states have been set, or events handled: it does not begin anew */
     int64_t has_row;         /* the row is that of the present time, and so are the outputs */
     int64_t is_over;
     int (*between)(void *, double, double *); /* called at ends of steps, while one is going on */
@@ -114,6 +115,18 @@ static void set_stops(dap3d_model *m)
     }
 }
 
+/* Hold the inputs as they are; whether they are others than before. */
+static int take_inputs(dap3d_model *m)
+{
+    int differ = 0;
+    for (int v = 1; v <= INPUTS; v++) { /* behind time */
+        double value = *numbers(m, variables[v].first);
+        differ |= value != m->held[v];
+        m->held[v] = value;
+    }
+    return differ;
+}
+
 static void begin(dap3d_model *m, double t_end)
 {
     const int64_t *next = content;
@@ -125,6 +138,7 @@ static void begin(dap3d_model *m, double t_end)
     m->t_end = t_end;
     m->first_h = -1.0;
     m->span = t_end;
+    take_inputs(m);
     for (int k = 0; k < INTEGRATIONS; k++) {
         double *times = numbers(m, integrations[k].times);
         times[0] = 0.0;
@@ -236,29 +250,28 @@ static void place_parameter(dap3d_model *m, int v, double x)
         *numbers(m, places[variables[v].first + k].word) = places[variables[v].first + k].sign * x;
 }
 
-#if FIXED
-/* Set a parameter on which the start depends: the run begins anew, with all that has been set. */
-static int set_fixed(dap3d_model *m, int v, double x)
+/* Set a parameter before a run: it begins anew, with all that has been set. */
+static void begin_with(dap3d_model *m, int v, double x)
 {
     double values[VARIABLES];
-    if (m->t > 0.0 || integer_of(m)[I_step_count] > 0)
-        return fail(m, DAP3D_INVALID, "this parameter is set before a run begins");
+    int64_t is_other = m->is_other;
     for (int k = 0; k < VARIABLES; k++)
         values[k] = variables[k].kind == DAP3D_INPUT || is_parameter(k) ? dap3d_get(m, k) : 0.0;
-    int64_t is_other = m->is_other;
     begin(m, m->t_end);
+    m->is_other = is_other;
+#if FIXED
+    m->is_other |= variables[v].kind == DAP3D_FIXED;
+    for (size_t k = 0; k < sizeof moving / sizeof *moving; k++)
+        m->is_other |= v == moving[k] ? 2 : 0;
+#endif
     values[v] = x;
     for (int k = 0; k < VARIABLES; k++)
         if (is_parameter(k))
             place_parameter(m, k, values[k]);
-        else if (variables[k].kind == DAP3D_INPUT)
-            *numbers(m, variables[k].first) = values[k];
-    m->is_other = is_other | 1;
-    for (size_t k = 0; k < sizeof moving / sizeof *moving; k++)
-        m->is_other |= v == moving[k] ? 2 : 0;
-    return DAP3D_OK;
+    for (int k = 0; k < VARIABLES; k++) /* these change a run that begins with those of the scene */
+        if (variables[k].kind == DAP3D_INPUT && values[k] != dap3d_get(m, k))
+            dap3d_set(m, k, values[k]);
 }
-#endif
 
 int dap3d_set(dap3d_model *m, int v, double x)
 {
@@ -270,11 +283,9 @@ int dap3d_set(dap3d_model *m, int v, double x)
     if (kind == DAP3D_INPUT) {
         start(m);
         double *value = numbers(m, variables[v].first);
-        if (*value != x) {
-            *value = x;
-            m->is_changed = 1;
+        if (*value != x)
             m->has_row = 0;
-        }
+        *value = x;
         return DAP3D_OK;
     }
     int k = variables[v].first, is_low = x < places[k].low;
@@ -286,10 +297,11 @@ int dap3d_set(dap3d_model *m, int v, double x)
     double *value = numbers(m, places[k].word);
     if (*value == places[k].sign * x)
         return DAP3D_OK;
-#if FIXED
+    int is_before = m->t == 0.0 && integer_of(m)[I_step_count] == 0 && !m->is_under_way;
+    if (is_before && (m->has_begun || kind == DAP3D_FIXED))
+        return begin_with(m, v, x), DAP3D_OK;
     if (kind == DAP3D_FIXED)
-        return set_fixed(m, v, x);
-#endif
+        return fail(m, DAP3D_INVALID, "this parameter is set before a run begins, and before its states are");
     int result = m->t > 0.0 ? restart_here(m) : DAP3D_OK;
     place_parameter(m, v, x);
     m->has_row = 0;
@@ -572,6 +584,41 @@ static int weigh(dap3d_model *m, int b)
     return 1;
 }
 
+/* The least and the greatest moment of inertia of a body about its centre of mass. */
+static void find_moments(const double *J, double *least, double *most)
+{
+    double size = fmax(J[0], fmax(J[4], J[8])), mean = (J[0] + J[4] + J[8]) / size / 3.0;
+    double a = J[0] / size - mean, b = J[4] / size - mean, c = J[8] / size - mean;
+    double d = J[3] / size, e = J[6] / size, f = J[7] / size;
+    *least = fmin(J[0], fmin(J[4], J[8]));
+    *most = size;
+    if (d == 0.0 && e == 0.0 && f == 0.0)
+        return;
+    double spread = sqrt((a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)) / 6.0);
+    double minor = a * (b * c - f * f) - d * (d * c - e * f) + e * (d * f - b * e);
+    double angle = acos(fmax(-1.0, fmin(1.0, 0.5 * minor / (spread * spread * spread)))) / 3.0;
+    *least = size * (mean + 2.0 * spread * cos(angle + 2.0943951023931953));
+    *most = size * (mean + 2.0 * spread * cos(angle));
+}
+
+/* As mass_flags of formulations/arrays.py and Model.part_size: how much masses and inertias differ. */
+static void compare_masses(dap3d_model *m)
+{
+    double moments[2] = {INFINITY, 0.0}, masses[2] = {INFINITY, 0.0}, gyration = 0.0, low, high;
+    for (int b = 1; b <= BODY_COUNT; b++) {
+        const double *x = numbers(m, BODIES) + BODY_WIDTH * b;
+        find_moments(x + BODY_JP, &low, &high);
+        moments[0] = fmin(moments[0], low), moments[1] = fmax(moments[1], high);
+        masses[0] = fmin(masses[0], x[BODY_MASS]), masses[1] = fmax(masses[1], x[BODY_MASS]);
+        gyration = fmax(gyration, sqrt(high / x[BODY_MASS]));
+    }
+    double size = fmin(EXTENT, fmax(ARM, gyration));
+    low = fmin(masses[0], moments[0] / (size * size));
+    high = fmax(masses[1], moments[1] / (size * size));
+    *numbers(m, IS_EVEN) = masses[1] > UNEVEN * masses[0];
+    *numbers(m, IS_WEAK) = high > VERY_UNEVEN * low;
+}
+
 #if COMPLETES
 /* Inverses of mass and principal moments of inertia of a body, for steps of contacts. */
 static void invert(dap3d_model *m, int b)
@@ -579,6 +626,37 @@ static void invert(dap3d_model *m, int b)
     numbers(m, MASS_INVERSE)[b] = 1.0 / numbers(m, MASS)[b];
     for (int k = 9 * b; k < 9 * b + 9; k += 4)
         numbers(m, JP_INVERSE)[k] = 1.0 / numbers(m, JP)[k];
+}
+
+/* As _put_carried of integrators/moreau/arrays.py: what joints hold at bodies that are far lighter. */
+static void put_carried(dap3d_model *m)
+{
+    enum { SIZE = 2 * (BODY_COUNT + 1) };
+    double own[SIZE] = {0.0}, felt[SIZE], carried[SIZE], passed[SIZE], *found = numbers(m, CARRIED);
+    for (int b = 1; b <= BODY_COUNT; b++) {
+        own[2 * b] = numbers(m, MASS)[b];
+        find_moments(numbers(m, JP) + 9 * b, passed, own + 2 * b + 1);
+    }
+    memcpy(carried, own, sizeof own);
+    do {
+        m->w[LIGHT_COUNT] = 0;
+        for (int k = 0; k < SIZE; k += 2) {
+            int light = own[k] < LIGHT * carried[k] || own[k + 1] < LIGHT * carried[k + 1];
+            memcpy(felt + k, (light ? carried : own) + k, 16);
+            found[k] = light ? 1.0 / carried[k] : 0.0;
+            found[k + 1] = light ? 1.0 / carried[k + 1] : 0.0;
+            m->w[LIGHT_COUNT] += light;
+        }
+        memcpy(passed, carried, sizeof carried);
+        memcpy(carried, felt, sizeof felt);
+        for (int row = 0; row < JOINT_ROWS; row++) {
+            const int64_t *body = m->w + ROW_BODY, first = m->w[ROW_START + row];
+            for (int64_t p = first; p < m->w[ROW_START + row + 1]; p++)
+                for (int64_t q = first; q < m->w[ROW_START + row + 1]; q++)
+                    for (int c = 0; c < 2; c++)
+                        carried[2 * body[p] + c] = fmax(carried[2 * body[p] + c], felt[2 * body[q] + c]);
+        }
+    } while (memcmp(carried, passed, sizeof carried) != 0);
 }
 #endif
 
@@ -607,6 +685,7 @@ static void take_given(dap3d_model *m, double *y)
 static int find_start(dap3d_model *m)
 {
     double *y = y_of(m), *k = numbers(m, METRIC), kept[7 * (BODY_COUNT + 1)], none[1] = {0.0};
+    compare_masses(m);
     if (m->is_other & 2)
         take_given(m, y);
     if ((m->is_other & 2) && ASSEMBLES) {
@@ -629,6 +708,9 @@ static int find_start(dap3d_model *m)
             invert(m, heavy[n]);
 #endif
         }
+#if COMPLETES
+    put_carried(m);
+#endif
     table_call(m, BEGIN, 0.0, y, none, 0);
     for (int n = 1; n < INTEGRATIONS; n++)
         memcpy(numbers(m, integrations[n].state), y, 8 * STATES);
@@ -833,12 +915,9 @@ static int jump(dap3d_model *m)
 /* As Hold.to: integrate with steps that end at a time. */
 static int hold_to(dap3d_model *m, double end)
 {
-    if (m->is_changed) {
-        int result = jump(m);
-        m->is_changed = 0;
-        if (result != DAP3D_OK)
-            return result;
-    }
+    int result = take_inputs(m) ? jump(m) : DAP3D_OK;
+    if (result != DAP3D_OK)
+        return result;
     m->first_h = real_of(m)[R_h];
     m->first_rejected = integer_of(m)[I_rejected_count];
     integer_of(m)[I_row_count] = 0;
@@ -962,6 +1041,7 @@ int dap3d_set_states(dap3d_model *m, double t, const double *y)
     double *real = real_of(m);
     memmove(y_of(m), y, 8 * STATES);
     m->t = real[R_t] = t;
+    m->is_under_way = 1;
     m->has_row = m->is_ahead = 0;
     m->is_over = GOES_ON;
     integer_of(m)[I_status] = RUNNING;
@@ -1108,6 +1188,7 @@ int dap3d_event(dap3d_model *m, int *changed)
     if (!are_ordered(m))
         return DAP3D_INVALID;
     dap3d_states(m, y);
+    m->is_under_way = 1;
     if (dap3d_project(m, m->t, y, &moved) != DAP3D_OK)
         return DAP3D_ERROR;
     *changed = moved > 0.0;

@@ -7,6 +7,7 @@ import zipfile
 import pytest
 from support.plain import jit_is_on
 
+import dap3d_core as dap
 from dap3d_core.cli import main
 
 pytestmark = [
@@ -40,6 +41,38 @@ def test_an_fmu_is_chosen_by_its_suffix(tmp_path, capfd, fmi):
     assert "cone.r.z" in found["outputs"]
     with zipfile.ZipFile(target) as archive:
         assert f'fmiVersion="{fmi}.0"' in archive.read("modelDescription.xml").decode()
+
+
+@pytest.mark.slow
+def test_settings_are_those_of_a_run(tmp_path):
+    """Steps of 20 ms show in bits; tolerances of some quantities as well."""
+    for words, given in (
+        (["--integrator", "rk4", "--step", "0.02"], {"integrator": "rk4", "step": 0.02}),
+        (["--atol", "r=1e-4,w=1e-3", "--no-project"],
+         {"atol": {"r": 1e-4, "w": 1e-3}, "project": False}),
+    ):  # fmt: skip
+        target = tmp_path / "pen1"
+        assert main(["export", "pen1", "-o", str(target), "--force", *words]) == 0
+        run = dap.load_native(target).start(0.5)
+        run.step_to(0.5)
+        expected = dap.simulate("pen1", t_end=0.5, dt=0.5, **given).quantity("cone.r.x").values[-1]
+        assert run["cone.r.x"] == expected
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--integrator", "rk4"], "--step: rk4 does not choose its step"),
+        (["--rtol", "7"], "--rtol = 7.0: should be at most 1"),
+        (["--format", "urdf", "--no-project"], "--project is of formats c and fmu"),
+        (["--format", "urdf", "--contact-step", "1e-3"], "--contact-step is of formats c and fmu"),
+    ],
+)
+def test_wrong_settings_are_told_by_their_options(tmp_path, monkeypatch, capfd, words, said):
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", "pen1", "-o", "made", *words]) == 2
+    assert said in capfd.readouterr().err
+    assert not [*tmp_path.iterdir()]
 
 
 @pytest.mark.parametrize("suffix", [".c", ".h"])
