@@ -309,7 +309,7 @@ class Model(Bodies):
 
     @cached_property
     def reach(self) -> float:
-        """The length, m, of which positions have the rounding: ``length``, or how far bodies are."""
+        """The length, m, of which positions have the rounding: ``length``, or the distance."""
         farthest = float(np.max(np.abs(self.r), initial=0.0))
         return farthest if farthest > ORDINARY[1] * self.length else self.length
 

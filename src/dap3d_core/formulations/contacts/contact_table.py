@@ -120,9 +120,7 @@ class ContactTable:
         rounds: of an impact that are kept.
         """
         evaluator, model = self.evaluator, self.evaluator.model
-        names = (
-            "e", "ratio", "ratio_s", "gapless", "arm", "turns", "says", "switches", "rounding"
-        )
+        names = ("e", "ratio", "ratio_s", "gapless", "arm", "turns", "says", "switches", "rounding")
         given = {name: getattr(self, name) for name in names}
         slots = model.joint_slots[len(model.joint_names) - self.count :]
         places, order = evaluator.system.row, np.zeros(evaluator.plan.row_size, dtype=np.int64)

@@ -2,7 +2,7 @@
 
 By Poisson's law an impact has two phases (Glocker, Set-Valued Force Laws, 2001, ch. 10): impulses
 that stop what approaches, within their cones; then e times their normal parts, and friction within
-the cones of both together. By Newton's the normal velocity becomes -e of what it was. They go in
+the cones of these. By Newton's the normal velocity becomes -e of what it was. They go in
 rounds: in each what approaches answers, all at once, so that impacts travel through bodies that
 touch, as through Newton's cradle. Where e is zero everywhere one round of all that touch is enough.
 """
