@@ -169,6 +169,31 @@ def test_two_bodies_far_from_the_origin():
     np.testing.assert_allclose(apart[0], apart[1], atol=1e-4)
 
 
+@pytest.mark.parametrize("distance", [1e3, 1e5])
+def test_a_ball_bounces_to_rest_far_from_the_origin(distance):
+    """On a plane askew, whose gap has the rounding of the position: bounces end above that.
+
+    All bounces of 0.3 m with e = 0.5 last three times the fall; the instant is known as well as
+    the time in which the ball falls through that rounding. As near the origin, the steps were
+    without an end.
+    """
+    n, place = np.array([2.0, -1.0, 2.0]) / 3.0, distance * np.array([1.0, -0.3, 0.02])
+    scene = dap.Scene(name="a ball far away")
+    scene.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=place + 0.4 * n)
+    scene.add_force("weight", "g", wgt=(-n).tolist())
+    scene.add_point("there", "ground", place)
+    scene.add_vector("n", "ground", n)
+    scene.add_contact(
+        "ball_plane", "floor", P_i="ball.O", radius=0.1, P_j="there", a_j="n", mu=0.3, e=0.5
+    )
+    result = dap.simulate(scene, t_end=0.8, dt=0.1, rtol=1e-10, integrator="dop853")
+    (rests,) = (e.t for e in result.events if e.kind == "rest")
+    rounding = 32.0 * np.finfo(float).eps * distance
+    assert abs(rests - 3.0 * np.sqrt(2.0 * 0.3 / 9.81)) < np.sqrt(2.0 * rounding / 9.81)
+    assert result.stats.steps < 500
+    assert np.abs(result.rd[-1]).max() < 1e-9
+
+
 @pytest.mark.parametrize("integrator", ["dop853", "adams"])
 def test_a_light_cart_under_a_heavy_bob_is_not_singular(integrator):
     """The bob on a massless rod under a cart of no mass falls straight down below it: a cart that

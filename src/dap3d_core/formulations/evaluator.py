@@ -142,7 +142,7 @@ class Evaluator:
     @cached_property
     def switches(self) -> tuple[Switch, ...]:
         """The switches of the model's elements, in the order in which ``watch`` gives them."""
-        return switches_of(self.loop_groups, self.model.length)
+        return switches_of(self.loop_groups, self.model.length, self.model.reach)
 
     @property
     def friction_failure_count(self) -> int:

@@ -14,7 +14,7 @@ from dap3d_core.model.knots import narrowest
 #: Kernels by which velocities and states jump.
 JUMPING = frozenset(("impulse", "reset"))
 #: Bodies that touch are apart, or not, by the rounding of their positions: this part of the length
-#: of the scene is some of them.
+#: of the scene, or of how far bodies are from the origin (``Model.reach``), is some of them.
 POSITION_ROUNDING = 32.0 * float(np.finfo(float).eps)
 #: Slip, m/s of a scene of that size, and the rest of a cone, N, that are rounding of contacts that
 #: begin to slip, or to stick.
@@ -34,6 +34,7 @@ class Switch:
             the element from its bound.
         is_one_of_several, part: where the kernel gives a tuple, which of its numbers.
         length: of the scene, m (Model.length); 1 rad of a contact whose gap or slip is an angle.
+        reach: the length, m, of which positions have the rounding; the same.
     """
 
     group: Group
@@ -42,6 +43,7 @@ class Switch:
     is_one_of_several: bool
     part: int
     length: float = 1.0
+    reach: float = 1.0
 
     @property
     def words(self) -> str:
@@ -88,9 +90,9 @@ class Switch:
             if self.is_contact and self.part == 1:
                 return STILL * self.length
             touches = self.is_contact or (self.jumps and type_.unilateral and not self.words)
-            return POSITION_ROUNDING * self.length if touches else 0.0
+            return POSITION_ROUNDING * self.reach if touches else 0.0
         if self.effect == SEAM:
-            return POSITION_ROUNDING * self.length
+            return POSITION_ROUNDING * self.reach
         row, numbers = self.group.numbers[self.place], self.group.type_info.layout.numbers
         own = [place for name, place in numbers.items() if name.endswith(KNOTS)]
         knots = [row[at : at + count] for at, (count,) in own]
@@ -105,20 +107,22 @@ class Switch:
         return f"{name} [{self.part + 1}]" if is_numbered else name
 
 
-def switches_of(loops: Iterable[tuple[str, Group]], length: float = 1.0) -> tuple[Switch, ...]:
+def switches_of(
+    loops: Iterable[tuple[str, Group]], length: float = 1.0, reach: float = 1.0
+) -> tuple[Switch, ...]:
     """The switches of a model in the order in which ``watch`` gives them.
 
     Args:
         loops: (kind, group).
-        length: of the scene, m.
+        length, reach: of the scene, m.
     """
 
-    def length_of(group: Group) -> float:
+    def lengths_of(group: Group) -> tuple[float, float]:
         type_: Any = group.type_info.type
-        return 1.0 if type_.is_contact and type_.at is None else length
+        return (1.0, 1.0) if type_.is_contact and type_.at is None else (length, reach)
 
     return tuple(
-        Switch(group, k, kind, len(group.type_info.outputs[kind]) > 1, part, length_of(group))
+        Switch(group, k, kind, len(group.type_info.outputs[kind]) > 1, part, *lengths_of(group))
         for kind, group in loops
         if kind in ("switch", "bound", "knot")
         for k in range(group.count)

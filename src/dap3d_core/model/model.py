@@ -311,6 +311,12 @@ class Model(Bodies):
             return 1.0
         return float(10.0 ** np.round(np.log10(size)))
 
+    @cached_property
+    def reach(self) -> float:
+        """The length, m, of which positions have the rounding: ``length``, or the distance."""
+        farthest = float(np.max(np.abs(self.r), initial=0.0))
+        return farthest if farthest > ORDINARY[1] * self.length else self.length
+
     def row_owner(self, row: int) -> str:
         """Name of the joint that a constraint row belongs to."""
         return self.row_owners([row])[0]

@@ -72,6 +72,7 @@ class ContactArrays(Arrays):
     ratio_s: Floats
     e: Floats
     length: Floats  # (m,) of the scene, m
+    rounding: Floats  # of gaps, m
     arm: Floats  # of what turns that length, which makes it slip; else 1
     gapless: Floats  # 1 where the first row is one of slip, and not along a normal
     newton: Integers  # 1 where the law of impact is Newton's

@@ -15,6 +15,7 @@ from dap3d_core.formulations.contacts.contact_arrays import (
     contact_arrays,
 )
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
+from dap3d_core.formulations.switches import POSITION_ROUNDING
 from dap3d_core.interface.codegen.compile_loops import compiled_loop
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import pointer
@@ -41,6 +42,7 @@ class ContactTable:
         turns: (m,) 1 of those whose gap or slip is an angle, 0 of others.
         length: (m,) what limits of gaps and speeds are multiplied by: the length of the scene, m;
             1 rad of those that turn.
+        rounding: (m,) m, of gaps.
         arm: (m,) m, of those that turn: on it their angles are gaps and slip, as of the others; 1.
         movable: (m,) True of those that a scene may have moved until they touch.
         alone: (m,) True of friction without a gap: of joints.
@@ -101,6 +103,8 @@ class ContactTable:
         )  # fmt: skip
         self.length = np.where(self.turns > 0.0, 1.0, model.length)
         self.arm = model.length / self.length
+        reach = np.where(self.turns > 0.0, model.length, model.reach)
+        self.rounding = POSITION_ROUNDING * reach
         self.gapless = (self.alone & self.holds[:, 0]).astype(float)
         self.way: Integers = self.mode[:, None] + np.arange(1, 4)
         self.near: Integers = self.mode[:, None] + np.arange(4, 7)
@@ -116,9 +120,7 @@ class ContactTable:
         rounds: of an impact that are kept.
         """
         evaluator, model = self.evaluator, self.evaluator.model
-        names = (
-            "e", "ratio", "ratio_s", "gapless", "arm", "turns", "says", "switches"
-        )  # fmt: skip
+        names = ("e", "ratio", "ratio_s", "gapless", "arm", "turns", "says", "switches", "rounding")
         given = {name: getattr(self, name) for name in names}
         slots = model.joint_slots[len(model.joint_names) - self.count :]
         places, order = evaluator.system.row, np.zeros(evaluator.plan.row_size, dtype=np.int64)

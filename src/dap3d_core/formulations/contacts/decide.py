@@ -24,6 +24,7 @@ from dap3d_core.formulations.contacts.equations import NEAR, WAY
 from dap3d_core.formulations.contacts.forces import put_slip_against, size_across, still_speed
 from dap3d_core.formulations.contacts.impacts import (
     AT_REST,
+    BOUNCES,
     collide,
     find_low,
     hold_low,
@@ -43,7 +44,6 @@ from dap3d_core.formulations.contacts.rows import (
     put_velocity,
     unscale,
 )
-from dap3d_core.formulations.switches import POSITION_ROUNDING
 from dap3d_core.interface.contacts.rows import STRAYED
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.least_squares import factor_least, solve_least
@@ -83,6 +83,8 @@ def decide(
     find_grips(t, s, system, tensions)
     put_outputs(t, s.says, system.multipliers, system, tensions)
     remember_modes(s, system)
+    for c in range(s.limit.shape[0]):
+        s.limit[c] = max(s.limit[c], BOUNCES * s.rounding[c] / s.arm[c])
     if s.starts != 0 and find_overlap(s):
         return OVERLAPS
     put_rows(t, s, system, loops)
@@ -432,7 +434,7 @@ def settle(s: ContactArrays, system: System) -> None:
     change(s, system)
     put_roles(s)
     for c in range(s.state.shape[0]):
-        gap, rounding = s.says.found[c, GAP], POSITION_ROUNDING * s.length[c]
+        gap, rounding = s.says.found[c, GAP], s.rounding[c]
         is_near = -DEEPER * s.limit[c] < gap < s.limit[c]
         s.values[c] = s.arm[c] * gap if is_near else 0.0
         s.least[c] = -2.0 * rounding

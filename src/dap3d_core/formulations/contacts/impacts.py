@@ -2,7 +2,7 @@
 
 By Poisson's law an impact has two phases (Glocker, Set-Valued Force Laws, 2001, ch. 10): impulses
 that stop what approaches, within their cones; then e times their normal parts, and friction within
-the cones of both together. By Newton's the normal velocity becomes -e of what it was. They go in
+the cones of these. By Newton's the normal velocity becomes -e of what it was. They go in
 rounds: in each what approaches answers, all at once, so that impacts travel through bodies that
 touch, as through Newton's cradle. Where e is zero everywhere one round of all that touch is enough.
 """
@@ -34,6 +34,8 @@ ROUNDS = 500
 #: those that follow end after the geometric series of their times, too near to tell from rest. The
 #: nearer e is to 1 the more bounces that takes: LAST_LOSS over 1 - e, up to a height that touches.
 LAST_HEIGHT, LAST_LOSS, TOUCHING = 1e-13, 1e-14, 1e-10
+#: Times the rounding of gaps that is the least such height, far from the origin.
+BOUNCES = 14.0
 
 
 @compiled
@@ -222,9 +224,10 @@ def unjam(s: ContactArrays, system: System) -> bool:
 
 
 @compiled
-def last_height(e: float) -> float:
-    """Height of a bounce from which on it is held, as a part of the length of the scene."""
-    return min(max(LAST_HEIGHT, LAST_LOSS / max(1.0 - e, LAST_HEIGHT)), TOUCHING)
+def last_height(s: ContactArrays, c: int) -> float:
+    """Height of a bounce, m, from which on it is held."""
+    part = min(max(LAST_HEIGHT, LAST_LOSS / max(1.0 - s.e[c], LAST_HEIGHT)), TOUCHING)
+    return max(part * s.length[c], BOUNCES * s.rounding[c])
 
 
 @compiled
@@ -243,7 +246,7 @@ def find_low(s: ContactArrays) -> bool:
         a = -s.free[3 * c]
         for q in range(n):
             a -= s.W[3 * c, q] * s.force[q // 3, q % 3]
-        if v * v < 2.0 * last_height(s.e[c]) * s.length[c] * a:
+        if v * v < 2.0 * last_height(s, c) * a:
             s.is_low[c], s.role[c], found = 1, 1, True
             if s.impulses[c, 0] > 0.0 and 0.0 < s.e[c] < 1.0:
                 # the speeds after bounces are v, e v, e^2 v, ...: that takes the sum of a series

@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 
+from dap3d_core.assembly.arrays import MODE_ENDS
 from dap3d_core.assembly.evaluate import copy
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.runge_kutta.stiffness import detect_stiffness
@@ -36,7 +37,7 @@ from dap3d_core.integrators.runge_kutta.sums import (
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.event_location import (
     end_is_across,
-    is_sample_across,
+    is_cut_at_sample,
     next_length,
     update_switches_after_step,
 )
@@ -72,7 +73,7 @@ from dap3d_core.integrators.stepping.step_control import (
     step_floor,
     step_reduction,
 )
-from dap3d_core.integrators.stepping.switch_values import evaluate
+from dap3d_core.integrators.stepping.switch_values import evaluate, near_edge
 from dap3d_core.integrators.stepping.vector_ops import all_finite, scaled_largest
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
@@ -269,8 +270,7 @@ def evaluate_stage(
         x = work.state[at.SCRATCH]
         if cut_at_stage(work, t, t1):
             return False
-    length = t1 - work.t
-    if work.switch_count != 0 and is_sample_across(work, t, length, x, watch, system, loops):
+    if work.switch_count != 0 and is_stage_across(work, t, t1, x, project, watch, system, loops):
         return False
     rhs(t, x, work.k[i], system, loops)
     return True
@@ -322,6 +322,32 @@ def project_stage(
     copy(work.state[at.OTHER], x)
     copy(argument, work.state[at.OTHER])  # which x may be
     project_state(work, t, argument, project, system, loops)
+
+
+@compiled
+def is_stage_across(
+    work: RungeKuttaState, t: float, t1: float, x: Floats, project: Function, watch: Function,
+    system: Any, loops: Any,
+) -> bool:  # fmt: skip
+    """As ``is_sample_across``; where a mode ends at x, it does on the constraints, too.
+
+    A stage is off them by its error: so slips what joints and contacts hold together, by more than
+    the slip that ends such a mode, in steps of nearly any length.
+    """
+    if work.sampled_switch_count == 0:
+        return False
+    s, ends = work.switches, 0
+    evaluate(work, t, x, at.SAMPLE, watch, system, loops)
+    for k in range(s.shape[1]):
+        ends |= (s[at.DOES, k] == MODE_ENDS) & (s[at.SIDE, k] * s[at.SAMPLE, k] < 0.0)
+    if ends != 0:
+        project_stage(work, t, x, project, system, loops)
+        evaluate(work, t, work.state[at.SCRATCH], at.FOUND, watch, system, loops)
+        copy(x, work.state[at.OTHER])
+        for k in range(s.shape[1]):
+            if s[at.DOES, k] == MODE_ENDS and s[at.SIDE, k] * s[at.FOUND, k] > near_edge(s, k):
+                s[at.SAMPLE, k] = s[at.FOUND, k]
+    return is_cut_at_sample(work, t, t1 - work.t)
 
 
 @compiled

@@ -174,7 +174,7 @@ def _numbers(prepared: PreparedRun) -> Iterator[tuple[str, Any, Any]]:
         given = prepared.start.arrays.given
         yield "given", given, np.arange(given.size)
     if isinstance(prepared.jumps, ContactCode):
-        for name in ("mu", "mu_s", "ratio", "ratio_s", "e", "length"):
+        for name in ("mu", "mu_s", "ratio", "ratio_s", "e", "length", "rounding"):
             array = getattr(prepared.jumps.arguments[0], name)
             yield f"contacts.{name}", array, np.arange(array.size)
     y = prepared.run.present.work.state[at.Y]
