@@ -264,7 +264,8 @@ def _are_alike(one: Run, other: Run) -> bool:
     is_unit = [np.abs(np.linalg.norm(v, axis=1) - 1.0) < UNIT for v in directions]
     turns = np.linalg.norm(directions[0] - directions[1], axis=1)
     has_turned = np.any(is_unit[0] & is_unit[1] & (turns > TURNED))
-    return bool(np.array_equal(*jumps) and np.array_equal(*scales)) and not has_turned
+    same = np.array_equal(jumps[0], jumps[1]) and np.array_equal(scales[0], scales[1])
+    return same and not has_turned
 
 
 def _vectors(run: Run) -> Floats:
