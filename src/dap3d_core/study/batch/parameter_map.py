@@ -17,6 +17,7 @@ from dap3d_core.assembly.metric import METRIC_CONSTANTS, METRIC_WIDTH
 from dap3d_core.assembly.turns import IS_POINT
 from dap3d_core.formulations.arrays import mass_flags, set_metric
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.interface.element_states import INITIAL, TOLERANCE
 from dap3d_core.interface.examine.examine import prepared
 from dap3d_core.interface.fields import FieldSpec, specs_of
@@ -202,10 +203,7 @@ class ParameterMap:
                     y0[:, first + state.first + component] = value
 
     def are_undefined(self, table: Floats, y0: Floats, sizes: Floats) -> Booleans:
-        """Points at whose start y0 (k, ...) the direction of an element is undefined.
-
-        sizes: (k,) of the points.
-        """
+        """Points, of these sizes, at whose start y0 (k, ...) a direction is undefined."""
         evaluator, count = self._evaluator, len(table)
         first_of = {id(group): first for group, first in self._groups()}
 
@@ -366,9 +364,8 @@ class ParameterMap:
 
     def _bodies_of(self, values: Floats) -> tuple[Floats, Floats]:
         """Masses (k, n) and inertia matrices (k, n, 3, 3) of all bodies, if they are valid."""
-        checked = self._checked
-        mass = np.repeat(checked.mass[None], len(values), axis=0)
-        Jp = np.repeat(checked.Jp[None], len(values), axis=0)
+        every = self._checked.mass, self._checked.Jp
+        mass, Jp = (np.repeat(of[None], len(values), axis=0) for of in every)
         if len(self._bodies):
             *of_bodies, valid = self._inertias(values)
             at = np.ix_(valid, self._bodies)
@@ -378,8 +375,8 @@ class ParameterMap:
     def _scales(self, mass: Floats, Jp: Floats, values: Floats) -> Scales:
         """Scales (k,) of points, with bodies as of ``_bodies_of``."""
         checked = self._checked
-        r = np.repeat(checked.r[None], len(values), axis=0)
-        local = np.repeat(checked.point_local[None], len(values), axis=0)
+        every = checked.r, checked.point_local
+        r, local = (np.repeat(of[None], len(values), axis=0) for of in every)
         for parameter, value in zip(self.parameters, values.T, strict=True):
             table, name, field = (*parameter.path, "", "")[:3]
             if table == "points":
@@ -395,7 +392,11 @@ class ParameterMap:
         scales = self._scales(mass, Jp, values)
         own = mass_flags(model.mass, model.Jp, model.part_size)
         is_same = np.all(mass_flags(mass, Jp, scales.part_size) == own, axis=-1)
-        return np.asarray(is_same & (scales.exponent == model.scales.exponent), dtype=np.bool_)
+        is_same &= scales.exponent == model.scales.exponent
+        tree = self._evaluator.system.tree
+        if tree is not None and np.any(tree.nodes[:, node.MOTION] == node.PRISMATIC):
+            is_same &= scales.part_size == model.part_size  # it is their coordinates at the start
+        return np.asarray(is_same, dtype=np.bool_)
 
 
 def _point_fields(checked: ValidatedScene, instance: Instance, point: str) -> Iterator[str]:

@@ -190,6 +190,31 @@ def test_points_of_other_sizes_have_the_tolerances_of_single_runs(case, method):
 
 
 @long_in_plain_python
+def test_points_in_joint_coordinates_slide_from_the_sizes_of_their_own_scenes():
+    """The coordinate of a slider begins at the size of the parts, and its tolerance with it."""
+    scene = dap.Scene(name="hanging from a slider")
+    scene.add_body(
+        "slider", mass=1.0, Jp=(0.05, 0.1, 0.1), r=(0.5, 0.0, 0.0), r_dot=(0.6, 0.0, 0.0)
+    )
+    scene.add_body("bob", mass=1.0, Jp=(0.05, 0.1, 0.1), r=(0.5, -0.3, 0.0), w=(0.0, 0.0, 2.0),
+                   r_dot=(1.2, 0.0, 0.0))  # fmt: skip
+    scene.add_point("rail", "ground", (2.0, 0.0, 0.0))
+    scene.add_point("eye", "bob", (0.0, 0.3, 0.0))
+    scene.add_joint("tran", "track", P_i="slider.O", P_j="rail", a_j="ground.x")
+    scene.add_joint("rev", "pin", P_i="eye", P_j="slider.O", a_i="bob.z", a_j="slider.z")
+    scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
+    scene.add_force("ptp", "spring", P_i="slider.O", P_j="rail", k=50.0, l0=1.0)
+    of = ensemble(
+        scene, ["bodies.bob.mass"], ["slider.r:series"], method="joint", t_end=0.3, dt=0.1
+    )
+    assert path_of(of) == "copied"
+    points = np.array([[1.0], [0.01], [1.1]])
+    batch = of.run(points)
+    for output, single in singly(of, points).items():
+        assert np.array_equal(batch.values[output], single)
+
+
+@long_in_plain_python
 def test_starts_are_corrected_within_the_size_of_their_points():
     """A pass moves bodies by a part of the size: where it ends depends on that."""
     of = ensemble(small_pendulum(0.05), ["points.A.sPp.z"], ["bob.r:series"], t_end=0.1, dt=0.05)
