@@ -254,14 +254,16 @@ def _all_groups(model: Model) -> tuple[Group, ...]:
     return (*model.functions, *model.forces, *model.joints, *model.friction)
 
 
-def mass_flags(mass: Floats, Jp: Floats, size: float) -> Floats:
+def mass_flags(mass: Floats, Jp: Floats, size: Floats | float) -> Floats:
     """(..., 2) EVEN and WEAK of masses (..., n) and inertia matrices (..., n, 3, 3), 1.0 or 0.0.
 
     EVEN: a pivot would tell of the masses and not of the pose (UNEVEN); WEAK: masses and moments of
-    inertia, over the square of ``size``, m, of the largest part, may make rows weak (VERY_UNEVEN).
+    inertia, over the square of ``size`` (...) of the largest part, m, may make rows weak
+    (VERY_UNEVEN).
     """
-    every = np.concatenate([mass[..., None], np.linalg.eigvalsh(Jp) / size**2], axis=-1)
-    every = every.reshape(*every.shape[:-2], -1)
+    moments = np.linalg.eigvalsh(Jp) / np.square(size)[..., None, None]
+    every = np.concatenate([mass[..., None], moments], axis=-1)
+    every = every.reshape(*every.shape[:-2], every.shape[-2] * every.shape[-1])
     of_masses, of_all = (
         np.max(of, axis=-1, initial=0.0) > limit * np.min(of, axis=-1, initial=np.inf)
         for of, limit in ((mass, UNEVEN), (every, VERY_UNEVEN))

@@ -16,7 +16,8 @@ from dap3d_core.interface.codegen.reactions import joint_fields
 from dap3d_core.interface.types import BodyPose, pose
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers, PrepareError
 from dap3d_core.model.joint_angles import JointAngles, joint_angle_name
-from dap3d_core.model.rotations import read_only, to_global
+from dap3d_core.model.rotations import read_only
+from dap3d_core.model.scales import ORDINARY, Scales, scales_of
 from dap3d_core.model.state_layout import (
     COORDINATES,
     VELOCITIES,
@@ -33,13 +34,6 @@ from dap3d_core.scene.validate.validated_scene import Bodies
 if TYPE_CHECKING:
     from dap3d_core.model.element_states import ElementState
     from dap3d_core.scene.expressions.expression import Expression
-
-#: Sizes, m, of ordinary scenes: their tolerances are in metres as they are.
-ORDINARY = 0.03, 30.0
-#: An extent beyond is none: a radius of gyration of masses that are no masses.
-WIDEST = 1e20
-#: Points nearer than this part of their distance from the origin are one but for rounding.
-EXTENT = 1e-12
 
 
 @attrs.frozen(eq=False)
@@ -262,54 +256,35 @@ class Model(Bodies):
         return read_only(np.concatenate([coordinates, np.hstack([self.r_dot, self.w]).ravel()]))
 
     @cached_property
+    def scales(self) -> Scales:
+        """Lengths of the model, m."""
+        return scales_of(self.mass, self.Jp, self.r, self.p, self.point_body, self.point_local)
+
+    @property
     def size(self) -> float:
         """Largest distance of the model from the origin, m; if that is zero, its extent."""
-        points = np.vstack([self.r, self.point_local])
-        return float(np.max(np.abs(points), initial=0.0)) or self.extent
+        return float(self.scales.size)
 
-    @cached_property
+    @property
     def extent(self) -> float:
         """A length of the model, m, wherever it lies: the diagonal of the box about its points.
 
         Of one point its largest radius of gyration; one metre where there is no body.
         """
-        if not self.body_count:
-            return 1.0
-        poses = np.vstack([[1.0, 0.0, 0.0, 0.0], self.p])[self.point_body]
-        places = np.vstack([np.zeros(3), self.r])[self.point_body]
-        points = np.vstack([self.r, places + to_global(poses, self.point_local)])
-        extent = float(np.linalg.norm(np.max(points, axis=0) - np.min(points, axis=0)))
-        if extent > EXTENT * float(np.max(np.abs(points))):
-            return extent
-        return self.gyration
+        return float(self.scales.extent)
 
-    @cached_property
-    def gyration(self) -> float:
-        """The largest radius of gyration of a body, m."""
-        moments = np.linalg.norm(self.Jp, ord=2, axis=(1, 2))
-        return float(np.sqrt(np.max(moments / self.mass, initial=0.0)))
-
-    @cached_property
+    @property
     def part_size(self) -> float:
         """The size of the largest part, m: arm or radius of gyration of a body, up to the extent.
 
         A chain of a thousand links has errors as one of ten.
         """
-        return min(self.extent, max(self.arm, self.gyration)) if self.body_count else self.extent
+        return float(self.scales.part_size)
 
-    @cached_property
-    def arm(self) -> float:
-        """The largest distance of a point of a body from its centre of mass, m."""
-        arms = np.linalg.norm(self.point_local[self.point_body > 0], axis=1)
-        return float(np.max(arms, initial=0.0))
-
-    @cached_property
+    @property
     def length(self) -> float:
         """The length, m, that tolerances speak of: 1 in ordinary scenes, else a power of ten."""
-        size = self.part_size
-        if ORDINARY[0] <= size <= ORDINARY[1] or not 1 / WIDEST < size < WIDEST:
-            return 1.0
-        return float(10.0 ** np.round(np.log10(size)))
+        return float(10.0**self.scales.exponent)
 
     @cached_property
     def reach(self) -> float:

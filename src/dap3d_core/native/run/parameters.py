@@ -214,14 +214,14 @@ def _is_assembled_alike(other: PreparedRun) -> bool:
 def mass_numbers(prepared: PreparedRun) -> dict[str, Any]:
     """Numbers and places in the memory, by their names in C, of what follows from masses."""
     evaluator, place = prepared.evaluator, prepared.image.at
-    model, settings = evaluator.model, place(evaluator.system.settings)
+    scales, settings = evaluator.model.scales, place(evaluator.system.settings)
     found: dict[str, Any] = {
         "IS_EVEN": settings + EVEN,
         "IS_WEAK": settings + WEAK,
         "UNEVEN": UNEVEN,
         "VERY_UNEVEN": VERY_UNEVEN,
-        "EXTENT": "INFINITY" if model.extent == model.gyration else model.extent.hex(),
-        "ARM": model.arm.hex(),
+        "EXTENT": "INFINITY" if scales.extent == scales.gyration else float(scales.extent).hex(),
+        "ARM": float(scales.arm).hex(),
     }
     if not prepared.steps_contacts:
         return found

@@ -24,6 +24,7 @@ from dap3d_core.simulation.initial.assemble import (
     distance,
 )
 from dap3d_core.simulation.initial.breakpoints import stops_of
+from dap3d_core.simulation.initial.tolerances import resolved_atol
 from dap3d_core.simulation.initial.undefined_directions import undefined_directions
 from dap3d_core.simulation.initial_state import InitialState, find_start, start_notes
 from dap3d_core.study.batch import driver, initial_state
@@ -94,6 +95,8 @@ class BatchRunner:
         with contextlib.suppress(NotCopiedError):
             parameter_map = ParameterMap(compiled.checked, evaluator, parameters)
             has_start = evaluator.coordinates.are_of_bodies or parameter_map.keeps_poses
+            if compiled.model.length != 1.0:
+                has_start = False  # weights of rows follow the poses, tolerances the motion
             if has_start and (not parameter_map.moves_start or self._has_compiled_correction()):
                 self.parameter_map = parameter_map
 
@@ -136,10 +139,11 @@ class BatchRunner:
         self._refer_to_start()
         start, valid = self._mapped_starts(parameter_map, values)
         which = np.flatnonzero(valid)
-        start = start._replace(table=start.table[which], y0=start.y0[which])
+        start = start.take(which)
         rows = self._runs.run(start)
         if parameter_map.moves:
-            rows.done[parameter_map.are_undefined(start.table, rows.y0)] = False
+            is_undefined = parameter_map.are_undefined(start.table, rows.y0, start.sizes)
+            rows.done[is_undefined] = False
         return which, rows
 
     def _refer_to_start(self) -> None:
@@ -162,7 +166,8 @@ class BatchRunner:
             y0 = np.repeat(y0, len(values), axis=0)
         parameter_map.set_states(y0, values)
         start = driver.CORRECT if moves_start and model.row_count else driver.UNCORRECTED
-        return Starts(table, parameter_map.places, y0, start), valid
+        sizes = parameter_map.sizes(values)
+        return Starts(table, parameter_map.places, y0, start, sizes), valid
 
     def _copied_starts(self, parameter_map: ParameterMap, values: Floats) -> Starts:
         """Starts of points (k, p) in coordinates of the formulation."""
@@ -181,6 +186,7 @@ class BatchRunner:
     def _rebuilt(self, values: Floats) -> tuple[Integers, Starts, list[str]]:
         """Indices of points that can be run with models of their own, their starts and notes."""
         points = [self._rebuilder.prepare(value) for value in values]
+        self._rebuilder.restore()
         self.compiled_batch.evaluator.set_inputs(self._compiled.model.input_values)
         which = [k for k, point in enumerate(points) if point is not None]
         found = [point for point in points if point is not None]
@@ -219,8 +225,9 @@ class BatchRunner:
         if self._differentiated is None:
             self._differentiated = DifferentiatedBatch(batch, len(x), directions_of(len(x))[1])
         rows, slopes = self._differentiated.run(*found)
-        if by_map is not None and by_map.moves and by_map.are_undefined(found[0].table, rows.y0)[0]:
-            return None
+        start = found[0]
+        if by_map is not None and by_map.moves:
+            rows.done[by_map.are_undefined(start.table, rows.y0, start.sizes)] = False
         return (rows.rows[0], slopes) if self._good(rows)[0] else None
 
     def _good(self, rows: BatchRows) -> Booleans:
@@ -236,9 +243,15 @@ class BatchRunner:
             batch.values[name][index] = of_rows
         others = [o for o in reduction.outputs if not reduction.of_rows[o.name]]
         for k, point, of_run in zip(index, values, rows, strict=True) if others else ():
-            _, model = self._rebuilder.load(point)
+            try:
+                _, model = self._rebuilder.load(point)
+            except (ModelError, ValueError):  # its joints move otherwise
+                batch.status[k] = PointStatus.OPEN
+                continue
             result = reduction.result(model, of_run, self.compiled_batch.evaluator, point)
             batch.store(int(k), result, others)
+        if others:
+            self._rebuilder.restore()
 
     def _note_corrections(
         self, rows: BatchRows, good: Integers, index: Integers, notes: list[str]
@@ -247,7 +260,7 @@ class BatchRunner:
         evaluator = self.compiled_batch.evaluator
         large = (
             rows.diagnostics[good, initial_state.C_BEFORE]
-            > SMALL_CORRECTION * self.compiled_batch.size
+            > SMALL_CORRECTION * rows.diagnostics[good, initial_state.SIZE]
         )
         good, index = good[large], index[large]
         moved, turned = distance(rows.given[good], rows.y0[good], evaluator.model.body_count)
@@ -309,7 +322,7 @@ class ModelRebuilder:
         self._options = (bool(settings.correct), settings.hold, str(settings.correct_metric))
         self._rank = compiled.start(*self._options).redundancy.rank.rank
         self.places = np.arange(len(numbers_of(evaluator)))
-        self._structure = self._structure_of(evaluator)
+        self._shared = self._structure()
 
     def load(self, point: Floats) -> tuple[ValidatedScene, Model]:
         """Load the model of a point into the evaluator.
@@ -323,6 +336,10 @@ class ModelRebuilder:
         model = build_model(checked)
         self._evaluator.load(model)
         return checked, self._evaluator.model
+
+    def restore(self) -> None:
+        """Load the model of the scene as given: points run with its scales and weights."""
+        self._evaluator.load(self._compiled.model)
 
     def prepare(self, point: Floats) -> _RebuiltPoint | None:
         """A point as it starts; None where it cannot be run in a batch."""
@@ -351,13 +368,13 @@ class ModelRebuilder:
         notes = start_notes(start, evaluator, checked.scene)
         warnings = tuple(warnings_of(notes))
         y0 = evaluator.coordinates.start(start.u)  # before the numbers: they hold its reference
-        if self._structure_of(evaluator) != self._structure:
+        if self._structure() != self._shared:
             return None
         return _RebuiltPoint(numbers_of(evaluator), y0, warnings)
 
-    @staticmethod
-    def _structure_of(evaluator: Evaluator) -> bytes:
-        """What points share: scale and flags of masses; the nodes of a tree, which may differ."""
-        system = evaluator.system
+    def _structure(self) -> bytes:
+        """What points share: scales, weights, tolerances, flags of masses, the nodes of a tree."""
+        system, given = self._evaluator.system, self._compiled.scene.simulation.atol
         nodes = system.tree.nodes.tobytes() if system.tree is not None else b""
-        return bytes(system.settings[[LENGTH, EVEN, WEAK]].tobytes() + nodes)
+        shared = system.settings[[LENGTH, EVEN, WEAK]].tobytes() + system.weight.tobytes() + nodes
+        return bytes(shared + repr(resolved_atol(given, self._evaluator)).encode())

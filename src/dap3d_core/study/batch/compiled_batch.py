@@ -54,17 +54,19 @@ class Starts(NamedTuple):
         places: (w,) their indices in the numbers (``numbers_of``).
         y0: (k, n) states to start from.
         start: UNCORRECTED, CORRECT, or CORRECT_ONLY (driver.py).
+        sizes: (k,) or (1,) of their models, m, by which a start is corrected.
     """
 
     table: Floats
     places: Integers
     y0: Floats
     start: int = driver.UNCORRECTED
+    sizes: Floats = np.zeros(1)
 
-    @property
-    def first(self) -> "Starts":
-        """The first point alone."""
-        return self._replace(table=self.table[:1], y0=self.y0[:1])
+    def take(self, which: Any) -> "Starts":
+        """Some of the points."""
+        sizes = np.broadcast_to(self.sizes, len(self.table))[which]
+        return self._replace(table=self.table[which], y0=self.y0[which], sizes=sizes)
 
 
 class BatchRows(NamedTuple):
@@ -217,8 +219,10 @@ class CompiledBatch:
 
     def points(self, starts: Starts) -> driver.Points:
         """Points to run."""
-        table, places, y0, start = starts
+        table, places, y0, start, sizes = starts
         count, nt = len(table), len(self.integration.work.rows)
+        diagnostics = np.zeros((count, driver.COLUMNS))
+        diagnostics[:, initial_state.SIZE] = sizes
         own = not self.evaluator.coordinates.are_of_bodies
         return driver.Points(
             at=np.array([0, 0, start, own], dtype=np.int64),
@@ -226,7 +230,7 @@ class CompiledBatch:
             table=np.array(table, dtype=float, order="C"),
             y0=np.array(y0, dtype=float),
             rows=np.empty((count * nt, self.evaluator.model.row_layout["inputs"].start)),
-            diagnostics=np.zeros((count, driver.COLUMNS)),
+            diagnostics=diagnostics,
             **self.constants,
         )
 
@@ -262,7 +266,7 @@ class CompiledBatch:
         if may_take_lanes and self._is_long(count):
             from dap3d_core.formulations.programs.scene_program import reads_rates
 
-            lanes = self._lanes_for(starts.first)
+            lanes = self._lanes_for(starts.take(slice(1)))
             if not isinstance(lanes, str) and lanes.is_ready:
                 run(lambda: lanes.run(points, CALL), needs_programs=reads_rates(self.evaluator))
         while True:
@@ -313,7 +317,6 @@ def start_constants(evaluator: Evaluator, room: int = 0) -> dict[str, Floats]:
     """
     model, first = evaluator.model, initial_state.STARTING
     starting = np.zeros(first + evaluator.plan.row_size + room)
-    starting[initial_state.SIZE] = model.size
     starting[first + evaluator.system.row[np.flatnonzero(~model.position_row)]] = 1.0
     return {"unit": np.array([model.length, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0]), "starting": starting}
 
@@ -357,12 +360,12 @@ class TreePoints:
         coordinates = self._batch.evaluator.coordinates
         assert isinstance(coordinates, TreeCoordinates)
         first = coordinates.start(self._u)
-        table, places, y0, start = starts
+        table, places, y0, start, sizes = starts
         if start == driver.UNCORRECTED:
             y = np.repeat(first[None], len(table), axis=0)
             return self._batch.run(starts._replace(y0=y))._replace(given=y0, y0=y0)
         known = places < len(numbers_of(self._other.evaluator))
-        to_correct = Starts(table[:, known], places[known], y0, driver.CORRECT_ONLY)
+        to_correct = Starts(table[:, known], places[known], y0, driver.CORRECT_ONLY, sizes)
         corrected = self._other.run(to_correct)
         y = coordinates.starts(self._u, u_from_y(corrected.y0))
         rows = self._batch.run(Starts(table, places, y))

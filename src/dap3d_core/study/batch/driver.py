@@ -15,7 +15,7 @@ from dap3d_core.integrators.stepping.integration_state import FINISHED, NOISE, R
 from dap3d_core.kernels.runtime.array_struct import Arrays, Matrix
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.model.groups import Floats, Integers
-from dap3d_core.study.batch.initial_state import LEAST_PIVOT, OPEN, STARTING
+from dap3d_core.study.batch.initial_state import LEAST_PIVOT, OPEN, SIZE, STARTING
 
 # Entries of ``at``: the current point, whether its run has begun, how to start; whether states are
 # in coordinates of the formulation's own, and rows have to be brought to those of bodies.
@@ -48,7 +48,7 @@ class Points(Arrays):
     first_switches: Matrix
     first_lengths: Matrix
     rows: Matrix  # (k nt, width) reported rows
-    diagnostics: Matrix  # (k, COLUMNS)
+    diagnostics: Matrix  # (k, COLUMNS); SIZE is given
 
 
 @compiled
@@ -105,6 +105,7 @@ def start(
     if points.at[START] != 0:
         for b in range(1, metric.shape[0]):
             copy_into(metric[b], points.unit)
+        points.starting[SIZE] = diagnostics[SIZE]
         starting[1](t, y, points.starting, system, loops)
         copy_into(diagnostics[:STARTING], points.starting[:STARTING])
         for b in range(1, metric.shape[0]):

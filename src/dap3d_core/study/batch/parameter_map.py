@@ -17,6 +17,7 @@ from dap3d_core.assembly.metric import METRIC_CONSTANTS, METRIC_WIDTH
 from dap3d_core.assembly.turns import IS_POINT
 from dap3d_core.formulations.arrays import mass_flags, set_metric
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.interface.element_states import INITIAL, TOLERANCE
 from dap3d_core.interface.examine.examine import prepared
 from dap3d_core.interface.fields import FieldSpec, specs_of
@@ -25,6 +26,7 @@ from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS
 from dap3d_core.model import Group
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.model import ReferencePoses
+from dap3d_core.model.scales import Scales, scales_of
 from dap3d_core.model.state_layout import join, split, u_from_y, y_from_u
 from dap3d_core.scene import Instance, ValidatedScene
 from dap3d_core.scene.validate.bodies import SMALLEST_INERTIA, ZERO_INERTIA
@@ -115,6 +117,10 @@ class ParameterMap:
         system, n = evaluator.system, 1 + self._bodies[:, None]
         if any(group.type_info.layout.unknowns for group in evaluator.model.joints):
             raise NotCopiedError  # their unknowns are sought anew for each point
+        self._changes_scales = any(
+            p.table == "points" or (p.table == "bodies" and p.path[2] in ("mass", "Jp", "r"))
+            for p in parameters
+        )
         counters = np.r_[0:0, *evaluator.turn_places()]  # zero at the start of each run
         self._counters = len(counters)
         body = system.par.size + n * BODY_WIDTH
@@ -141,7 +147,8 @@ class ParameterMap:
 
         Returns:
             (k, w) numbers; (k,) False where the scene's check refuses a point, and its numbers are
-            not valid, and where masses differ so much more or less that a run has other passes.
+            not valid, and where its size or its masses are such that a run has other tolerances or
+            passes.
         """
         valid = np.ones(len(values), dtype=bool)
         parts = [np.zeros((len(values), self._counters))]
@@ -161,7 +168,15 @@ class ParameterMap:
             parts += [part.reshape(len(values), -1)
                       for part in (body, metric[1:, :METRIC_CONSTANTS])]  # fmt: skip
             parts.append(self._evaluator.coordinates.inertias(1 + self._bodies, mass, Jp))
+        if self._changes_scales:
+            valid[valid] &= self._has_scales_of_scene(values[valid])
         return np.hstack(parts), valid
+
+    def sizes(self, values: Floats) -> Floats:
+        """(k,) ``Model.size`` of points."""
+        if not self._changes_scales:
+            return np.full(len(values), self._evaluator.model.size)
+        return self._scales(*self._bodies_of(values), values).size
 
     def states(self, values: Floats, u0: Floats) -> Floats:
         """Integrated states (k, ...) to start from; u0 (13 n,) is that of the scene."""
@@ -187,8 +202,8 @@ class ParameterMap:
                     component = parameter.index[0] if parameter.index else 0
                     y0[:, first + state.first + component] = value
 
-    def are_undefined(self, table: Floats, y0: Floats) -> Booleans:
-        """Points at whose start y0 (k, ...) the direction of an element is undefined."""
+    def are_undefined(self, table: Floats, y0: Floats, sizes: Floats) -> Booleans:
+        """Points, of these sizes, at whose start y0 (k, ...) a direction is undefined."""
         evaluator, count = self._evaluator, len(table)
         first_of = {id(group): first for group, first in self._groups()}
 
@@ -200,7 +215,7 @@ class ParameterMap:
             return numbers.reshape(count, *group.numbers.shape)
 
         u = u_from_y(y0, evaluator.model.state_count)
-        return are_undefined(evaluator.model, u, numbers_of, evaluator.model.size)
+        return are_undefined(evaluator.model, u, numbers_of, float(np.max(sizes, initial=0.0)))
 
     # ------------------------------------------------------------------ one parameter
 
@@ -345,18 +360,43 @@ class ParameterMap:
         least, middle, most = np.linalg.eigvalsh(np.where(np.abs(Jp) <= LARGEST, Jp, 0.0)).T
         sound = (least > ZERO_INERTIA * most) & (most >= SMALLEST_INERTIA)
         valid &= np.all(sound & (most <= least + middle), axis=0)
-        valid[valid] &= self._has_flags_of_scene(mass[valid], Jp[valid])
         return mass, Jp, valid
 
-    def _has_flags_of_scene(self, mass: Floats, Jp: Floats) -> Booleans:
-        """(k,) True where bodies that vary leave the model's flags of masses as they are."""
-        checked, model = self._checked, self._evaluator.model
-        every = np.repeat(checked.mass[None], len(mass), axis=0)
-        inertias = np.repeat(checked.Jp[None], len(mass), axis=0)
-        every[:, self._bodies], inertias[:, self._bodies] = mass, Jp
-        own = mass_flags(checked.mass, checked.Jp, model.part_size)
-        flags: Floats = mass_flags(every, inertias, model.part_size)
-        return np.asarray(np.all(flags == own, axis=-1), dtype=np.bool_)
+    def _bodies_of(self, values: Floats) -> tuple[Floats, Floats]:
+        """Masses (k, n) and inertia matrices (k, n, 3, 3) of all bodies, if they are valid."""
+        every = self._checked.mass, self._checked.Jp
+        mass, Jp = (np.repeat(of[None], len(values), axis=0) for of in every)
+        if len(self._bodies):
+            *of_bodies, valid = self._inertias(values)
+            at = np.ix_(valid, self._bodies)
+            mass[at], Jp[at] = (own[valid] for own in of_bodies)
+        return mass, Jp
+
+    def _scales(self, mass: Floats, Jp: Floats, values: Floats) -> Scales:
+        """Scales (k,) of points, with bodies as of ``_bodies_of``."""
+        checked = self._checked
+        every = checked.r, checked.point_local
+        r, local = (np.repeat(of[None], len(values), axis=0) for of in every)
+        for parameter, value in zip(self.parameters, values.T, strict=True):
+            table, name, field = (*parameter.path, "", "")[:3]
+            if table == "points":
+                local[:, checked.point_names.index(name), parameter.index[0]] = value
+            elif (table, field) == ("bodies", "r"):
+                r[:, checked.body_index[name] - 1, parameter.index[0]] = value
+        return scales_of(mass, Jp, r, checked.p, checked.point_body, local)
+
+    def _has_scales_of_scene(self, values: Floats) -> Booleans:
+        """(k,) True where tolerances and flags of masses are those of the scene."""
+        model = self._evaluator.model
+        mass, Jp = self._bodies_of(values)
+        scales = self._scales(mass, Jp, values)
+        own = mass_flags(model.mass, model.Jp, model.part_size)
+        is_same = np.all(mass_flags(mass, Jp, scales.part_size) == own, axis=-1)
+        is_same &= scales.exponent == model.scales.exponent
+        tree = self._evaluator.system.tree
+        if tree is not None and np.any(tree.nodes[:, node.MOTION] == node.PRISMATIC):
+            is_same &= scales.part_size == model.part_size  # it is their coordinates at the start
+        return np.asarray(is_same, dtype=np.bool_)
 
 
 def _point_fields(checked: ValidatedScene, instance: Instance, point: str) -> Iterator[str]:

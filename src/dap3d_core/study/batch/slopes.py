@@ -13,6 +13,7 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.lanes import Differentiation
 from dap3d_core.study.batch import driver
 from dap3d_core.study.batch.compiled_batch import BatchRows, CompiledBatch, Starts
+from dap3d_core.study.batch.initial_state import SIZE
 from dap3d_core.study.differences import power_of_two, weighted, weights_of
 
 #: Steps and offsets of differences: of numbers that are copied, and of models that are made anew,
@@ -78,6 +79,7 @@ class DifferentiatedBatch:
             of.wide(argument)
         points.at[: driver.START + 1] = 0, 0, start.start
         points.table[:], points.y0[:] = start.table, start.y0
+        points.diagnostics[:, SIZE] = start.sizes
         of.take()
         of.slopes(points.table)[:, : self._count] = of_numbers
         of.slopes(points.y0)[:, : self._count] = of_state

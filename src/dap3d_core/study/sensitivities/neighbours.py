@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
+from dap3d_core.assembly.arrays import EVEN, LENGTH, WEAK
 from dap3d_core.formulations.coordinates import UnsuitableError
 from dap3d_core.integrators.stepping.integration_state import BEFORE, INSTANT
 from dap3d_core.kernels.array_types import Floats
@@ -250,18 +251,21 @@ def floats_of(run: Run) -> dict[str, Floats]:
 def _are_alike(one: Run, other: Run) -> bool:
     """True if the arrays of two runs are of the same sizes, and the same steps end at breaks.
 
+    The length that tolerances speak of, and flags of masses, are the same: they jump with a number.
     Directions that types have chosen (``normals``) are those of the one, turned a little.
     """
     shapes = [[(name, array.shape) for name, array in arrays_of(run)] for run in (one, other)]
     if shapes[0] != shapes[1]:
         return False
+    scales = [run.evaluator.system.settings[[LENGTH, EVEN, WEAK]] for run in (one, other)]
     stops = [run.present.work.stops for run in (one, other)]
     jumps = [table[BEFORE] < table[INSTANT] for table in stops]
     directions = [_vectors(run) for run in (one, other)]
     is_unit = [np.abs(np.linalg.norm(v, axis=1) - 1.0) < UNIT for v in directions]
     turns = np.linalg.norm(directions[0] - directions[1], axis=1)
     has_turned = np.any(is_unit[0] & is_unit[1] & (turns > TURNED))
-    return bool(np.array_equal(*jumps)) and not has_turned
+    same = np.array_equal(jumps[0], jumps[1]) and np.array_equal(scales[0], scales[1])
+    return same and not has_turned
 
 
 def _vectors(run: Run) -> Floats:

@@ -151,6 +151,99 @@ def test_points_whose_masses_differ_much_more_have_the_passes_of_single_runs(pat
         assert np.array_equal(batch.values[name], single)
 
 
+def small_pendulum(size):
+    """A bob on a ball joint, and a spring from it to a post."""
+    scene = dap.Scene(name="small")
+    motion = {"w": (1.0, 2.0, 3.0), "r_dot": (3.0 * size, 0.0, -size)}
+    Jp = [k * size**2 for k in (0.1, 0.2, 0.14)]
+    scene.add_body("bob", mass=2.0, Jp=Jp, r=(0.0, -size, 0.0), **motion)
+    scene.add_point("A", "bob", (0.0, size, 0.0))
+    scene.add_point("post", "ground", (size, size, 0.0))
+    scene.add_joint("sph", "pivot", P_i="A", P_j="ground.O")
+    scene.add_force("weight", "gravity", gravity=9.81 * size, wgt=(0.0, -1.0, 0.0))
+    scene.add_force("ptp", "spring", P_i="bob.O", P_j="post", k=20.0, c=0.2, l0=size)
+    scene.simulation.method = "standard"
+    return scene
+
+
+#: Size, varied number, values: some leave the size of the scene, its tolerances or its weights.
+SIZES = {
+    "arm": (0.05, "points.A.sPp.y", (0.05, 0.0005, 0.06)),
+    "mass": (0.02, "bodies.bob.mass", (2.0, 1e-4, 2.1)),
+    "time": (1e-3, "forces.gravity.gravity", (9.81e-3, 98.1, 9.9e-3)),
+    "speed": (1e-3, "bodies.bob.w.z", (3.0, 3000.0, 3.1)),
+}
+
+
+@long_in_plain_python
+@pytest.mark.parametrize("method", ["standard", "lsq"])
+@pytest.mark.parametrize("case", SIZES)
+def test_points_of_other_sizes_have_the_tolerances_of_single_runs(case, method):
+    size, name, values = SIZES[case]
+    of = ensemble(small_pendulum(size), [name], ["bob.r:series", "energy.total:series"],
+                  method=method, t_end=0.1, dt=0.05)  # fmt: skip
+    points = np.array([values[:2], values[1:]]).reshape(-1, 1)  # also behind one that is other
+    batch = of.run(points)
+    for output, single in singly(of, points).items():
+        scale = np.max(np.abs(single))
+        np.testing.assert_allclose(batch.values[output], single, atol=1e-13 * scale, rtol=0.0)
+
+
+@long_in_plain_python
+def test_points_in_joint_coordinates_slide_from_the_sizes_of_their_own_scenes():
+    """The coordinate of a slider begins at the size of the parts, and its tolerance with it."""
+    scene = dap.Scene(name="hanging from a slider")
+    scene.add_body(
+        "slider", mass=1.0, Jp=(0.05, 0.1, 0.1), r=(0.5, 0.0, 0.0), r_dot=(0.6, 0.0, 0.0)
+    )
+    scene.add_body("bob", mass=1.0, Jp=(0.05, 0.1, 0.1), r=(0.5, -0.3, 0.0), w=(0.0, 0.0, 2.0),
+                   r_dot=(1.2, 0.0, 0.0))  # fmt: skip
+    scene.add_point("rail", "ground", (2.0, 0.0, 0.0))
+    scene.add_point("eye", "bob", (0.0, 0.3, 0.0))
+    scene.add_joint("tran", "track", P_i="slider.O", P_j="rail", a_j="ground.x")
+    scene.add_joint("rev", "pin", P_i="eye", P_j="slider.O", a_i="bob.z", a_j="slider.z")
+    scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
+    scene.add_force("ptp", "spring", P_i="slider.O", P_j="rail", k=50.0, l0=1.0)
+    of = ensemble(
+        scene, ["bodies.bob.mass"], ["slider.r:series"], method="joint", t_end=0.3, dt=0.1
+    )
+    assert path_of(of) == "copied"
+    points = np.array([[1.0], [0.01], [1.1]])
+    batch = of.run(points)
+    for output, single in singly(of, points).items():
+        assert np.array_equal(batch.values[output], single)
+
+
+@long_in_plain_python
+def test_starts_are_corrected_within_the_size_of_their_points():
+    """A pass moves bodies by a part of the size: where it ends depends on that."""
+    of = ensemble(small_pendulum(0.05), ["points.A.sPp.z"], ["bob.r:series"], t_end=0.1, dt=0.05)
+    assert path_of(of) == "copied"
+    points = np.array([[0.0], [0.1], [-0.5]])
+    batch = of.run(points)
+    for output, single in singly(of, points).items():
+        np.testing.assert_allclose(batch.values[output], single, atol=1e-12)
+
+
+@long_in_plain_python
+def test_a_start_far_away_whose_joints_move_otherwise_is_run_alone():
+    """A hinge whose ends are 20 times its arms apart has no angle; energies need its model."""
+    scene = dap.Scene(name="two rods")
+    previous, axis = "ground.O", "ground.z"
+    for k, name in enumerate(("a", "b")):
+        scene.add_body(name, mass=1.0, Jp=(0.05, 0.1, 0.1), r=(0.5 + k, 0.0, 0.0))
+        start, end = (scene.add_point(f"{name}{x}", name, (0.5 * x, 0.0, 0.0)) for x in (-1, 1))
+        scene.add_joint("rev", f"hinge {name}", P_i=start, P_j=previous, a_i=f"{name}.z",
+                        a_j=axis)  # fmt: skip
+        previous, axis = end, f"{name}.z"
+    of = ensemble(scene, ["bodies.a.r.y"], ["energy.total"], method="standard", t_end=0.02, dt=0.01)
+    assert path_of(of) == "copied"
+    points = np.array([[0.0], [20.0]])
+    batch = of.run(points)
+    assert batch.status.tolist() == [DONE, DONE]
+    np.testing.assert_allclose(batch.values["energy.total"], singly(of, points)["energy.total"])
+
+
 @long_in_plain_python
 def test_a_point_does_not_depend_on_those_before_it():
     of = ensemble(wheel(), ["forces.spring.k", "forces.rubbing.mu"], ["wheel.w.z"], t_end=0.5)

@@ -299,3 +299,31 @@ def test_starts_without_a_residual_are_left():
     """Of an arm whose joints fit to the last digit; a pass would only move rounding about."""
     s = dap.sensitivities("two_link_arm", "bodies.lower.mass", t_end=0.02, dt=0.01)
     assert np.all(np.isfinite(s.of("lower.r")))
+
+
+@pytest.mark.parametrize(("size", "side"), [(0.03, 1.0), (3.162e-3, -1.0)])
+@pytest.mark.parametrize("method", ["standard", "joint"])
+def test_derivatives_at_the_edge_of_a_length_of_tolerances_are_those_of_its_side(
+    size, side, method
+):
+    """With the arm grows the length in which velocities are corrected, by a power of ten.
+
+    The derivative is that of the side on which the run is: beside one-sided differences of fourth
+    order of runs of 1e-11.
+    """
+
+    def scene_of(arm):
+        scene = dap.Scene(name="pendulum")
+        Jp = [k * size**2 for k in (0.1, 0.2, 0.14)]
+        motion = {"w": (1.0, 2.0, 3.0), "r_dot": (3.0 * size, 0.0, -size)}
+        scene.add_body("bob", mass=2.0, Jp=Jp, r=(0.0, -size, 0.0), **motion)
+        scene.add_point("A", "bob", (0.0, arm, 0.0))
+        scene.add_joint("sph", "pivot", P_i="A", P_j="ground.O")
+        return scene
+
+    settings = {"method": method, "t_end": 0.2, "dt": 0.2, "rtol": 1e-11, "atol": 1e-13}
+    found = dap.sensitivities(scene_of(size), "points.A.sPp.y", **settings).of("bob.r.x")[-1, 0]
+    h = side * 1e-3 * size
+    values = [dap.simulate(scene_of(size + k * h), **settings).r[-1, 0, 0] for k in range(5)]
+    expected = np.dot([-25.0, 48.0, -36.0, 16.0, -3.0], values) / (12.0 * h)
+    assert found == pytest.approx(expected, rel=1e-8)
