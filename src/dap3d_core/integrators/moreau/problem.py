@@ -10,11 +10,7 @@ one does, and each is solved as if it were alone.
 from dap3d_core.assembly.evaluate import copy
 from dap3d_core.integrators.moreau.arrays import CONE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import put_inertia, put_speeds
-from dap3d_core.integrators.moreau.gauss_seidel import (
-    copy_impulses,
-    sweep_bodies,
-    sweep_contacts,
-)
+from dap3d_core.integrators.moreau.gauss_seidel import copy_impulses, sweep_bodies, sweep_contacts
 from dap3d_core.integrators.moreau.matrix import lay_out
 from dap3d_core.integrators.moreau.newton import (
     TINY,

@@ -34,11 +34,7 @@ from dap3d_core.integrators.radau.state import TRIAL_SLOPE, Given, RadauState
 from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.integration_state import OTHER, SCRATCH, TRIAL, Y
 from dap3d_core.kernels.compiler.types import Table
-from dap3d_core.kernels.runtime.array_struct import (
-    Arrays,
-    IntegerMatrix,
-    Matrix,
-)
+from dap3d_core.kernels.runtime.array_struct import Arrays, IntegerMatrix, Matrix
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.kernels.scalar_math import is_differentiated
 from dap3d_core.linear.lu import StateNode, make_lu_plan, solve_lu

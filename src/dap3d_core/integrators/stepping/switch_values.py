@@ -16,13 +16,7 @@ DIFFERENCE, LEAST_DIFFERENCE = 1e-4, 1e-8
 
 @compiled
 def evaluate(
-    work: IntegrationState,
-    t: float,
-    x: Floats,
-    row: int,
-    watch: Function,
-    system: Any,
-    loops: Any,
+    work: IntegrationState, t: float, x: Floats, row: int, watch: Function, system: Any, loops: Any
 ) -> None:
     """The switches at a state, into a row.
 
