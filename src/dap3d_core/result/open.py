@@ -21,16 +21,9 @@ from dap3d_core.result.arrays import (
     joined,
 )
 from dap3d_core.result.errors import ResultError
+from dap3d_core.result.file import schema
 from dap3d_core.result.file.checksum import check_checksums, check_signature
 from dap3d_core.result.file.library import NETCDF, OpenFile, reading, shared
-from dap3d_core.result.file.schema import (
-    CONSTANTS,
-    CONVENTIONS,
-    FORMAT,
-    SWEEP,
-    contacts_of,
-    record_of,
-)
 from dap3d_core.result.file.validate import (
     FORMS,
     check_claims,
@@ -87,18 +80,18 @@ def arrays_in(path: Path, summary: ModelSummary, count: int) -> "LazyArrays":
 
 def _check_format(file: Path, dataset: Any) -> None:
     names = dataset.ncattrs()
-    if SWEEP in names:
+    if schema.SWEEP in names:
         raise ResultError(
             f"cannot read {file}: it holds the points of a sweep, not the result of one run; "
             "dap.open_sweep reads it, dap3d info describes it"
         )
-    if "Conventions" not in names or dataset.getncattr("Conventions") != CONVENTIONS:
+    if "Conventions" not in names or dataset.getncattr("Conventions") != schema.CONVENTIONS:
         raise ResultError(f"cannot read {file}: a NetCDF-4 file, but no result of dap3d")
     version = int(dataset.getncattr("format"))
-    if version > FORMAT:
+    if version > schema.FORMAT:
         raise ResultError(
             f"cannot read {file}: {dataset.getncattr('source')} wrote it in format {version}, this "
-            f"program reads up to {FORMAT}; install a newer dap3d"
+            f"program reads up to {schema.FORMAT}; install a newer dap3d"
         )
 
 
@@ -110,7 +103,7 @@ def _read(dataset: Any) -> tuple[ModelSummary, RunMetadata, int]:
         values[name] = json.loads(values[name])
     check_forms(values, FORMS)
     summary = _subject(dataset, values)
-    record = record_of(values, contacts_of(dataset))
+    record = schema.record_of(values, schema.contacts_of(dataset))
     check_subject(summary)
     count = len(dataset.dimensions["time"])
     if record.status == RUNNING:
@@ -127,7 +120,7 @@ def _subject(dataset: Any, values: dict[str, Any]) -> ModelSummary:
     for kind in ("body", "joint", "point", "input"):
         names = dataset.variables[kind][:] if kind in dataset.dimensions else ()
         parts[f"{kind}_names"] = tuple(map(str, names))
-    for constant in CONSTANTS:
+    for constant in schema.CONSTANTS:
         if constant.dimensions[0] in dataset.dimensions:
             parts[constant.name] = np.asarray(dataset.variables[constant.name][:])
         else:

@@ -15,16 +15,7 @@ from dap3d_core.formulations.joint.equations import normalise_rotations
 from dap3d_core.formulations.joint.place import place_tree, put
 from dap3d_core.formulations.joint.reduce import reduce_nodes
 from dap3d_core.formulations.joint.spread import spread_tree
-from dap3d_core.formulations.joint_loops import layout
-from dap3d_core.formulations.joint_loops.loads import (
-    carry_rows,
-    kept_residuals,
-    lacking_velocities,
-    linearise_kept,
-    multiply_loads,
-    push_freedoms,
-    rest,
-)
+from dap3d_core.formulations.joint_loops import layout, loads
 from dap3d_core.formulations.joint_loops.profile import (
     PART,
     factor_profile,
@@ -40,7 +31,7 @@ from dap3d_core.kernels.scalar_math import where
 #: the rows hold something themselves.
 LESS, HELD = 16.0, 10.0
 
-normalise, linearise = normalise_rotations, linearise_kept
+normalise, linearise = normalise_rotations, loads.linearise_kept
 
 
 @compiled_into
@@ -53,7 +44,7 @@ def place(t: float, y: Floats, system: System, loops: Any) -> None:
 @compiled_into
 def residuals(t: float, system: System, loops: Any) -> float:
     """C of the kept rows into ``residual``; the largest, m."""
-    kept_residuals(t, system, loops)
+    loads.kept_residuals(t, system, loops)
     return largest_weighted(system.residual, system.weight)
 
 
@@ -75,12 +66,12 @@ def factorise_anyway(system: System, part: float | None) -> bool:
     the start; ``part`` is not used.
     """
     reduce_nodes(system, system.force, True)
-    carry_rows(system)
-    multiply_loads(system)
+    loads.carry_rows(system)
+    loads.multiply_loads(system)
     weigh_kept_rows(system, system.tree.kept.settings[layout.PART_OF_ROW])
     if factor_profile(system):
         return True
-    multiply_loads(system)
+    loads.multiply_loads(system)
     weigh_kept_rows(system, PART)
     factor_profile(system)
     return False
@@ -98,7 +89,7 @@ def displace(y: Floats, system: System) -> None:
 @compiled_into
 def velocity_residuals(system: System) -> float:
     """D v - nu of the kept rows into ``right``; the largest, m/s."""
-    lacking_velocities(system)
+    loads.lacking_velocities(system)
     return largest_lacking(system)
 
 
@@ -138,7 +129,7 @@ def have_come_to_hold(system: System) -> bool:
     kept = system.tree.kept
     for j in range(kept.profile.shape[0]):
         kept.solution[j] = kept.matrix[kept.profile[j, layout.PLACE] + j]
-    multiply_loads(system)
+    loads.multiply_loads(system)
     weigh_kept_rows(system, kept.settings[layout.PART_OF_FACTORS] / LESS)
     factor_profile(system)
     for j in range(kept.profile.shape[0]):
@@ -162,8 +153,8 @@ def aim_at_positions(system: System) -> None:
 def spread_change(system: System) -> None:
     """The least change of motion that gives the rows ``right``: its rates into ``slope``."""
     solve_profile(system)
-    rest(system)
-    push_freedoms(system)
+    loads.rest(system)
+    loads.push_freedoms(system)
     spread_tree(system.tree.slope, system.tree.slope, system)
 
 
