@@ -21,16 +21,9 @@ from dap3d_core.result.arrays import (
     joined,
 )
 from dap3d_core.result.errors import ResultError
-from dap3d_core.result.file import schema
+from dap3d_core.result.file import schema, validate
 from dap3d_core.result.file.checksum import check_checksums, check_signature
 from dap3d_core.result.file.library import NETCDF, OpenFile, reading, shared
-from dap3d_core.result.file.validate import (
-    FORMS,
-    check_claims,
-    check_forms,
-    check_numbers,
-    check_subject,
-)
 from dap3d_core.result.metadata import RUNNING, RunMetadata
 from dap3d_core.result.result import Origin, Rebuild, Result
 
@@ -60,7 +53,7 @@ def open_result(path: str | os.PathLike[str], rebuild: Rebuild | None = None) ->
     with reading(file):
         content = shared(file)
         _check_format(file, content.dataset)
-        check_claims(file, content.dataset)
+        validate.check_claims(file, content.dataset)
         summary, record, count = _read(content.dataset)
         arrays: Arrays = LazyArrays(content, summary, count)
         if 8 * count * arrays.width <= LARGE:
@@ -101,10 +94,10 @@ def _read(dataset: Any) -> tuple[ModelSummary, RunMetadata, int]:
     values = older | {name: dataset.getncattr(name) for name in dataset.ncattrs()}
     for name in _JSON:
         values[name] = json.loads(values[name])
-    check_forms(values, FORMS)
+    validate.check_forms(values, validate.FORMS)
     summary = _subject(dataset, values)
     record = schema.record_of(values, schema.contacts_of(dataset))
-    check_subject(summary)
+    validate.check_subject(summary)
     count = len(dataset.dimensions["time"])
     if record.status == RUNNING:
         count, last = _complete_count(dataset, count), "nothing was reported"
@@ -232,6 +225,6 @@ class LazyArrays(Arrays):
                 f"cannot read {file}: {name} has the shape {values.shape}, not {shape}"
             )
         if name != U_ERROR.name:  # an estimate may hold NaN
-            check_numbers(file, name, values)
+            validate.check_numbers(file, name, values)
         values.flags.writeable = False
         return values

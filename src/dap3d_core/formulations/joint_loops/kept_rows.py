@@ -15,14 +15,7 @@ from dap3d_core.formulations.joint.equations import normalise_rotations
 from dap3d_core.formulations.joint.place import place_tree, put
 from dap3d_core.formulations.joint.reduce import reduce_nodes
 from dap3d_core.formulations.joint.spread import spread_tree
-from dap3d_core.formulations.joint_loops import layout, loads
-from dap3d_core.formulations.joint_loops.profile import (
-    PART,
-    factor_profile,
-    pivot_lengths,
-    solve_profile,
-    weigh_kept_rows,
-)
+from dap3d_core.formulations.joint_loops import layout, loads, profile
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import R, V, W
 from dap3d_core.kernels.scalar_math import where
@@ -68,12 +61,12 @@ def factorise_anyway(system: System, part: float | None) -> bool:
     reduce_nodes(system, system.force, True)
     loads.carry_rows(system)
     loads.multiply_loads(system)
-    weigh_kept_rows(system, system.tree.kept.settings[layout.PART_OF_ROW])
-    if factor_profile(system):
+    profile.weigh_kept_rows(system, system.tree.kept.settings[layout.PART_OF_ROW])
+    if profile.factor_profile(system):
         return True
     loads.multiply_loads(system)
-    weigh_kept_rows(system, PART)
-    factor_profile(system)
+    profile.weigh_kept_rows(system, profile.PART)
+    profile.factor_profile(system)
     return False
 
 
@@ -117,7 +110,7 @@ def change_velocities(y: Floats, system: System) -> float:
 @compiled_into
 def is_poor(t: float, system: System, loops: Any, part: float | None, lengths: Floats) -> bool:
     """True if the pose is close to a singular one."""
-    return pivot_lengths(system, lengths) > 0
+    return profile.pivot_lengths(system, lengths) > 0
 
 
 @compiled
@@ -130,8 +123,8 @@ def have_come_to_hold(system: System) -> bool:
     for j in range(kept.profile.shape[0]):
         kept.solution[j] = kept.matrix[kept.profile[j, layout.PLACE] + j]
     loads.multiply_loads(system)
-    weigh_kept_rows(system, kept.settings[layout.PART_OF_FACTORS] / LESS)
-    factor_profile(system)
+    profile.weigh_kept_rows(system, kept.settings[layout.PART_OF_FACTORS] / LESS)
+    profile.factor_profile(system)
     for j in range(kept.profile.shape[0]):
         inverse = kept.matrix[kept.profile[j, layout.PLACE] + j]
         if kept.smallest[j] == 0.0 and inverse < HELD * kept.solution[j]:
@@ -152,7 +145,7 @@ def aim_at_positions(system: System) -> None:
 @compiled
 def spread_change(system: System) -> None:
     """The least change of motion that gives the rows ``right``: its rates into ``slope``."""
-    solve_profile(system)
+    profile.solve_profile(system)
     loads.rest(system)
     loads.push_freedoms(system)
     spread_tree(system.tree.slope, system.tree.slope, system)

@@ -21,14 +21,8 @@ from dap3d_core.integrators.radau.newton import SAME_STEP, method_index, most_it
 from dap3d_core.integrators.radau.order import change_order, lower_order, raise_order
 from dap3d_core.integrators.radau.state import OLD, OLD_SLOPE, SLOPE, TRIAL_SLOPE, Given, RadauState
 from dap3d_core.integrators.radau.tableau import FEWEST
+from dap3d_core.integrators.stepping import event_location, step_control
 from dap3d_core.integrators.stepping import integration_state as at
-from dap3d_core.integrators.stepping import step_control
-from dap3d_core.integrators.stepping.event_location import (
-    end_is_across,
-    is_sample_across,
-    next_length,
-    update_switches_after_step,
-)
 from dap3d_core.integrators.stepping.integration_state import Function
 from dap3d_core.integrators.stepping.output import may_step, needs_dense, project_state
 from dap3d_core.integrators.stepping.rounding import can_measure, record_failure
@@ -121,7 +115,7 @@ def step(
     end = t1 = step_control.end_of_step(work)
     longest = h = t1 - t
     if work.switch_count != 0 or min(work.step_limit, t + work.step_limit_at_switch) < t1:
-        h = next_length(work, t1, state[SLOPE], rhs, project, watch, system, loops)
+        h = event_location.next_length(work, t1, state[SLOPE], rhs, project, watch, system, loops)
         if h == 0.0:
             return
         t1 = t1 if h == longest else t + h
@@ -150,7 +144,7 @@ def step(
         elif failure == at.RUNNING:
             work.near_singular_landings = 0
             accept(work, t1, h, error)
-            update_switches_after_step(work, h, longest, end)
+            event_location.update_switches_after_step(work, h, longest, end)
         else:
             step_control.reject(work, t1, h * step_control.STEP_AFTER_FAILURE, failure)
     elif error <= step_control.LARGEST:
@@ -168,7 +162,7 @@ def stage_is_across(
     for i in range(work.stages - 1):
         for k in range(x.shape[0]):
             x[k] = work.state[at.Y, k] + work.Z[i, k]
-        if is_sample_across(work, t + c[i] * h, h, x, watch, system, loops):
+        if event_location.is_sample_across(work, t + c[i] * h, h, x, watch, system, loops):
             return True
     return False
 
@@ -272,7 +266,7 @@ def complete_step(
         return at.NOT_FINITE
     if work.switch_count != 0:
         evaluate(work, t1, work.state[at.TRIAL], at.FOUND, watch, system, loops)
-        if end_is_across(work, t1, slope, watch, system, loops):
+        if event_location.end_is_across(work, t1, slope, watch, system, loops):
             return step_control.STEP_CUT
     if needs_dense(work, t1):
         prepare_dense(h, work)

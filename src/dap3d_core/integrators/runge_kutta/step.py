@@ -25,14 +25,9 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.evaluate import copy
+from dap3d_core.integrators.runge_kutta import sums
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.runge_kutta.stiffness import detect_stiffness
-from dap3d_core.integrators.runge_kutta.sums import (
-    ABSCISSA,
-    combine,
-    error_beyond_rounding,
-    error_norm,
-)
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping import singular_poses, step_control
 from dap3d_core.integrators.stepping.event_location import (
@@ -116,7 +111,7 @@ def step_error(
     if near:
         error = projected_error_norm(work, t1, h, project, system, loops)
     else:
-        error = error_norm(work, h)
+        error = sums.error_norm(work, h)
     if 1.0 < error <= step_control.LARGEST:
         error = error_above_rounding(work, near, h, error)
     return error
@@ -206,7 +201,7 @@ def error_above_rounding(work: RungeKuttaState, near: bool, h: float, error: flo
     if near:
         return 1.0 if is_rounding(work, h, error) else error
     if h * step_control.step_reduction(work, error) < step_control.step_floor(work):
-        return min(error, error_beyond_rounding(work, h))
+        return min(error, sums.error_beyond_rounding(work, h))
     return error
 
 
@@ -222,9 +217,9 @@ def take_stages(
     last = stages if work.error_uses_last_stage != 0 else stages - 1
     for i in range(1, stages + 1):
         x = work.state[at.TRIAL] if i == stages else work.state[at.SCRATCH]
-        combine(x, 1.0, work.state[at.Y], h, table, i, k)
+        sums.combine(x, 1.0, work.state[at.Y], h, table, i, k)
         if i <= last:
-            c = table[i, ABSCISSA]
+            c = table[i, sums.ABSCISSA]
             t = t1 if c == 1.0 else work.t + c * h
             if not evaluate_stage(work, i, t, x, t1, near, functions, system, loops):
                 return False
@@ -321,7 +316,7 @@ def projected_error_norm(
     for i in range(work.error_size):
         least = max(least, POSITION_NOISE * abs(y[i]))
     for e in range(work.estimate_count):
-        combine(other, 1.0, trial, -h, table, k.shape[0] + e, k)
+        sums.combine(other, 1.0, trial, -h, table, k.shape[0] + e, k)
         project_state(work, t1, other, project, system, loops)
         for i in range(other.size):
             other[i] -= result[i]
@@ -410,8 +405,8 @@ def take_dense_stages(
     """The further stages that dense output needs; False as for ``take_stages``."""
     t, argument, table, k = work.t, work.state[at.SCRATCH], work.table, work.k
     for i in range(work.stage_count + 1, k.shape[0]):
-        instant = t + table[i, ABSCISSA] * (t1 - t)
-        combine(argument, 1.0, work.state[at.Y], t1 - t, table, i, k)
+        instant = t + table[i, sums.ABSCISSA] * (t1 - t)
+        sums.combine(argument, 1.0, work.state[at.Y], t1 - t, table, i, k)
         if not evaluate_stage(work, i, instant, argument, t1, near, functions, system, loops):
             return False
     return True
@@ -441,5 +436,5 @@ def prepare_dense(work: RungeKuttaState, t1: float) -> None:
         terms[3, i] = rise - h * k[result, i] - terms[2, i]
     first = k.shape[0] + work.estimate_count
     for row in range(4, terms.shape[0]):
-        combine(terms[row], 0.0, state[at.Y], h, work.table, first + row - 4, k)
+        sums.combine(terms[row], 0.0, state[at.Y], h, work.table, first + row - 4, k)
     work.t_dense, work.h_dense = work.t, h
