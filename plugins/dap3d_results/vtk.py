@@ -48,18 +48,9 @@ class VtkExporter(ResultExporter):
                 f"{points:,} points at {instants:,} instants are {24 * points * instants / 1e9:.1f}"
                 f" GB, more than {LARGEST / 1e9:.1f}: a smaller fps leaves instants out"
             )
-        write_vtkhdf(moving, path, progress)
+        with created(path, path) as file:
+            _fill(file, moving, progress)
         return moving.notes
-
-
-def write_vtkhdf(scene: MovingScene, path: Path, progress: Progress | None = None) -> None:
-    """Write a file; ``progress`` is called with the instants that are written and all.
-
-    Raises:
-        ResultError: the file cannot be written.
-    """
-    with created(path, path) as file:
-        _fill(file, scene, progress)
 
 
 def point_count(scene: MovingScene) -> int:

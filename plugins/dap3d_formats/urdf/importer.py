@@ -1,6 +1,6 @@
 """URDF, the Unified Robot Description Format of ROS, and its macros, xacro."""
 
-from dap3d_core.interface.formats import Articulation, FormatError, Importer, Source, XmlElement
+from dap3d_core.interface.formats import Articulation, FormatError, Importer, Source
 
 
 class UrdfImporter(Importer):
@@ -14,14 +14,11 @@ class UrdfImporter(Importer):
         from dap3d_formats.urdf.reader import UrdfReader
 
         root = source.xml()
-        if source.path.suffix.lower() == ".xacro" or _has_macros(root):
+        has_macros = any(child.name.startswith("xacro:") for child in root)
+        if source.path.suffix.lower() == ".xacro" or has_macros:
             from dap3d_formats.urdf.xacro import expanded
 
             root = expanded(source, root)
         if root.name != "robot":
             raise FormatError(f"a URDF file is a <robot>, not a <{root.name}>", root.place)
         return UrdfReader(source, root).read()
-
-
-def _has_macros(root: XmlElement) -> bool:
-    return any(child.name.startswith("xacro:") for child in root)

@@ -11,13 +11,7 @@ from dap3d_core.scene import MISSING, Mistake, SceneError
 from dap3d_core.scene.errors import file_error
 from dap3d_matlab.files.report import FileFacts, Remark, remark
 from dap3d_matlab.language.interpreter import Workspace, follow
-from dap3d_matlab.language.parse import (
-    Grammar,
-    SourceFile,
-    m_files,
-    read_source,
-    syntax_mistakes,
-)
+from dap3d_matlab.language.parse import Grammar, SourceFile, m_files, read_source, syntax_mistakes
 from dap3d_matlab.language.structures import (
     DISKS,
     FILES,

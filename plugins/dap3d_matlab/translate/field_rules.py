@@ -90,9 +90,7 @@ FORCES: dict[str, tuple[Rule, ...]] = {
     "user": (),
 }
 _SPAN = _numbers(
-    x_start="x_start:x_start = 0",
-    x_end="x_end:x_end = 1",
-    f_start="f_start:f_start = 0",
+    x_start="x_start:x_start = 0", x_end="x_end:x_end = 1", f_start="f_start:f_start = 0"
 )
 _END = _numbers(f_end="f_end:f_end = 1")
 FUNCTIONS: dict[str, tuple[Rule, ...]] = {

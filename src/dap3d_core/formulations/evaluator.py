@@ -36,14 +36,7 @@ from dap3d_core.assembly.turns import (
     follow_poses,
     report_turns,
 )
-from dap3d_core.formulations import ACCEPTED, FORMULATIONS, REPORT, RHS, WATCH
-from dap3d_core.formulations.arrays import (
-    build_loops,
-    build_system,
-    load_numbers,
-    regrouped,
-    rows_read,
-)
+from dap3d_core.formulations import ACCEPTED, FORMULATIONS, REPORT, RHS, WATCH, arrays
 from dap3d_core.formulations.constraint_rows import ConstraintRows, jacobian_pattern, scaled_rows
 from dap3d_core.formulations.coordinates import Coordinates
 from dap3d_core.formulations.switches import Switch, switches_of
@@ -95,12 +88,14 @@ class Evaluator:
             self.plan: Plan = make_plan(
                 model.body_count, model.joint_slots, rows, model.contact_count
             )
-            self.loops, self.loop_groups = build_loops(model, self.formulation.loops, announce)
+            self.loops, self.loop_groups = arrays.build_loops(
+                model, self.formulation.loops, announce
+            )
         else:
             self.plan, self.loops = like.plan, like.loops
-            self.loop_groups = regrouped(like.model, model, like.loop_groups)
+            self.loop_groups = arrays.regrouped(like.model, model, like.loop_groups)
         self.model = model = with_motions(model, None if like is None else like.model)
-        self.system: System = build_system(model, self.plan, self.loop_groups)
+        self.system: System = arrays.build_system(model, self.plan, self.loop_groups)
         self.store_initial_function_values()
         self._seek_unknowns()
         self._weigh_rows()
@@ -161,7 +156,7 @@ class Evaluator:
             ValueError: the structure is another.
         """
         model = with_motions(model, self.model)
-        self.loop_groups = load_numbers(self.system, self.model, model, self.loop_groups)
+        self.loop_groups = arrays.load_numbers(self.system, self.model, model, self.loop_groups)
         self.model, self.states = model, model.initial_states
         self.__dict__.pop("switches", None)  # they name groups
         self.store_initial_function_values()
@@ -459,7 +454,7 @@ class Evaluator:
         w = np.where(turns_alone, turning / model.part_size**2, moving)
         last, size = s.friction.size - s.K.size, s.total.size
         s.friction[last - size : last][s.row] = np.where(np.isfinite(w) & (w > 0.0), w, 1.0)
-        s.friction[last - 2 * size : last - size][s.row] = rows_read(model, self.loop_groups)
+        s.friction[last - 2 * size : last - size][s.row] = arrays.rows_read(model, self.loop_groups)
 
     @IGNORE_FLOAT_ERRORS
     def place(self, t: float, u: ArrayLike) -> None:

@@ -6,14 +6,7 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import EVEN, LENGTH, WEAK, Floats, System
 from dap3d_core.assembly.evaluate import copy, global_accelerations, largest, zero
-from dap3d_core.formulations.common.constraints import (
-    PART,
-    acceleration_residual,
-    factorise,
-    factorise_regularised,
-    solve_equations,
-    solve_rows,
-)
+from dap3d_core.formulations.common import constraints
 from dap3d_core.formulations.common.friction import has_friction
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.kernels.scalar_math import where
@@ -37,7 +30,7 @@ NOTHING = 1e-20
 @compiled
 def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     """Scaled ``acceleration`` and ``multipliers``; returns the power of forces and drivers."""
-    return solve_equations(t, y, system, loops, PART, solve)
+    return constraints.solve_equations(t, y, system, loops, constraints.PART, solve)
 
 
 @compiled
@@ -64,11 +57,11 @@ def solve(system: System) -> None:
 @compiled
 def add_passes(system: System) -> float:
     """Passes, while each leaves much less of the rows; what is left, m/s^2."""
-    left, passes = acceleration_residual(system), 0
+    left, passes = constraints.acceleration_residual(system), 0
     before = np.inf
     while passes < MORE_SOLVES and left < FALLING * before:
         add_pass(system)
-        before, left = left, acceleration_residual(system)
+        before, left = left, constraints.acceleration_residual(system)
         passes += 1
     return left
 
@@ -96,12 +89,12 @@ def solve_weak_rows(system: System, left: float) -> None:
     limit = ROUGH * size_of_accelerations(system)
     if not left > limit:
         return
-    best, total, part = system.velocity, system.right_side, PART
+    best, total, part = system.velocity, system.right_side, constraints.PART
     copy(best, system.acceleration)
     copy(total, system.total)
     while left > limit and part > WEAKEST:
         part *= WEAKER
-        factorise(system, part)
+        constraints.factorise(system, part)
         now = add_passes(system)
         if now < LESS * left:
             left = now
@@ -109,7 +102,7 @@ def solve_weak_rows(system: System, left: float) -> None:
             copy(total, system.total)
     copy(system.acceleration, best)
     copy(system.total, total)
-    factorise(system, PART)
+    constraints.factorise(system, constraints.PART)
 
 
 @compiled
@@ -143,12 +136,12 @@ def take_seen(system: System, n: Floats, w: Floats, e: float) -> float:
     nothing = NOTHING * largest(system.total)
     for k in range(n.shape[0]):
         system.compliance[k] = e * w[k]
-    factorise_regularised(system)
+    constraints.factorise_regularised(system)
     for _ in range(LEAST_SOLVES):
         for k in range(n.shape[0]):
             x[k] = e * w[k] * n[k]
         zero(system.change)
-        solve_rows(system, system.change)
+        constraints.solve_rows(system, system.change)
         change = 0.0
         for k in range(n.shape[0]):
             x[k] = -x[k] if w[k] != 0.0 else 0.0  # else a hub's place
@@ -165,6 +158,6 @@ def add_pass(system: System) -> None:
     """Solve for what the accelerations leave of the rows; ``total`` takes the change of -lambda."""
     multipliers, total = system.multipliers, system.total
     copy(multipliers, system.gamma)
-    solve_rows(system, system.acceleration)
+    constraints.solve_rows(system, system.acceleration)
     for k in range(total.shape[0]):
         total[k] += multipliers[k]

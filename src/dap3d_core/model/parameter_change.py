@@ -11,14 +11,7 @@ from dap3d_core.model.groups import Floats, Group, Grouping, Integers
 from dap3d_core.model.model import Model, ReferencePoses
 from dap3d_core.registry.suggestions import did_you_mean
 from dap3d_core.scene import ValidatedScene
-from dap3d_core.scene.validate.coerce_values import (
-    Fault,
-    bounded,
-    matrix_of,
-    number_of,
-    numbers_of,
-    square_of,
-)
+from dap3d_core.scene.validate import coerce_values
 
 
 class Change(NamedTuple):
@@ -63,13 +56,13 @@ def _value(force: str, specs: Mapping[str, FieldSpec], name: str, value: Any) ->
     found: Any
     if spec.kind == "number":
         limits = {n: getattr(spec, n) for n in ("positive", "minimum", "maximum", "whole")}
-        found = bounded(number_of(value), **limits)
+        found = coerce_values.bounded(coerce_values.number_of(value), **limits)
     elif spec.kind == "square":
-        found = square_of(value, spec.columns)
+        found = coerce_values.square_of(value, spec.columns)
     else:
         count = {"vec3": 3, "numbers": spec.columns}.get(spec.kind, 0)
-        found = numbers_of(value, count) if count else matrix_of(value)
-    if isinstance(found, Fault):
+        found = coerce_values.numbers_of(value, count) if count else coerce_values.matrix_of(value)
+    if isinstance(found, coerce_values.Fault):
         raise ValueError(f"force {force}: {name} {found.what}, not {value!r}")
     return found
 

@@ -6,14 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 import attrs
 import numpy as np
 
+from dap3d_core.interface.codegen import reactions
 from dap3d_core.interface.codegen.kernel_arguments import parameters
-from dap3d_core.interface.codegen.reactions import (
-    READING,
-    bind_joints,
-    joint_fields,
-    joints_read,
-    reaction_names,
-)
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import line_of
 from dap3d_core.interface.examine.random_values import random_quantity
@@ -47,7 +41,7 @@ def bound_to_joints(
     found: list[Group] = []
     faults: list[tuple[int, str]] = []
     for group in groups:
-        fields = joints_read(group.type_info)
+        fields = reactions.joints_read(group.type_info)
         if not fields:
             found.append(group)
             continue
@@ -79,7 +73,7 @@ def _by_joints(
             for f, n in enumerate(which)
         )
         types = {field: j.type_info for field, j in zip(fields, joints, strict=True)}
-        yield _with_joints(part, bind_joints(group.type_info, types), joints)
+        yield _with_joints(part, reactions.bind_joints(group.type_info, types), joints)
 
 
 def _wrong_rows(
@@ -90,7 +84,7 @@ def _wrong_rows(
     joint_groups: Sequence[Group],
 ) -> Iterator[tuple[int, str]]:
     """Forces with a joint that has other rows than their type takes, in words."""
-    specs = joint_fields(group.type_info.type)
+    specs = reactions.joint_fields(group.type_info.type)
     refused: dict[tuple[int, ...], str] = {}
     for member, names in zip(group.members.tolist(), named, strict=True):
         rows = tuple(joint_groups[places[name][0]].type_info.row_count for name in names)
@@ -110,9 +104,9 @@ def _wrong_rows(
 def _refusal(group: Group, rows: Mapping[str, int]) -> str:
     """How a kernel fails with so many multipliers of each joint; "" where none does."""
     rng = random.Random(1)
-    offered = reaction_names(group.type_info.type, rows) | group.type_info.names
+    offered = reactions.reaction_names(group.type_info.type, rows) | group.type_info.names
     kernels = group.type_info.kernels
-    for name, kernel in ((name, kernels[name]) for name in READING if name in kernels):
+    for name, kernel in ((name, kernels[name]) for name in reactions.READING if name in kernels):
         try:
             kernel(*(random_quantity(offered[n], rng) for n in parameters(kernel)))
         except (IndexError, ValueError, TypeError) as error:

@@ -21,23 +21,9 @@ from dap3d_core.result.arrays import (
     joined,
 )
 from dap3d_core.result.errors import ResultError
+from dap3d_core.result.file import schema, validate
 from dap3d_core.result.file.checksum import check_checksums, check_signature
 from dap3d_core.result.file.library import NETCDF, OpenFile, reading, shared
-from dap3d_core.result.file.schema import (
-    CONSTANTS,
-    CONVENTIONS,
-    FORMAT,
-    SWEEP,
-    contacts_of,
-    record_of,
-)
-from dap3d_core.result.file.validate import (
-    FORMS,
-    check_claims,
-    check_forms,
-    check_numbers,
-    check_subject,
-)
 from dap3d_core.result.metadata import RUNNING, RunMetadata
 from dap3d_core.result.result import Origin, Rebuild, Result
 
@@ -67,7 +53,7 @@ def open_result(path: str | os.PathLike[str], rebuild: Rebuild | None = None) ->
     with reading(file):
         content = shared(file)
         _check_format(file, content.dataset)
-        check_claims(file, content.dataset)
+        validate.check_claims(file, content.dataset)
         summary, record, count = _read(content.dataset)
         arrays: Arrays = LazyArrays(content, summary, count)
         if 8 * count * arrays.width <= LARGE:
@@ -87,18 +73,18 @@ def arrays_in(path: Path, summary: ModelSummary, count: int) -> "LazyArrays":
 
 def _check_format(file: Path, dataset: Any) -> None:
     names = dataset.ncattrs()
-    if SWEEP in names:
+    if schema.SWEEP in names:
         raise ResultError(
             f"cannot read {file}: it holds the points of a sweep, not the result of one run; "
             "dap.open_sweep reads it, dap3d info describes it"
         )
-    if "Conventions" not in names or dataset.getncattr("Conventions") != CONVENTIONS:
+    if "Conventions" not in names or dataset.getncattr("Conventions") != schema.CONVENTIONS:
         raise ResultError(f"cannot read {file}: a NetCDF-4 file, but no result of dap3d")
     version = int(dataset.getncattr("format"))
-    if version > FORMAT:
+    if version > schema.FORMAT:
         raise ResultError(
             f"cannot read {file}: {dataset.getncattr('source')} wrote it in format {version}, this "
-            f"program reads up to {FORMAT}; install a newer dap3d"
+            f"program reads up to {schema.FORMAT}; install a newer dap3d"
         )
 
 
@@ -108,10 +94,10 @@ def _read(dataset: Any) -> tuple[ModelSummary, RunMetadata, int]:
     values = older | {name: dataset.getncattr(name) for name in dataset.ncattrs()}
     for name in _JSON:
         values[name] = json.loads(values[name])
-    check_forms(values, FORMS)
+    validate.check_forms(values, validate.FORMS)
     summary = _subject(dataset, values)
-    record = record_of(values, contacts_of(dataset))
-    check_subject(summary)
+    record = schema.record_of(values, schema.contacts_of(dataset))
+    validate.check_subject(summary)
     count = len(dataset.dimensions["time"])
     if record.status == RUNNING:
         count, last = _complete_count(dataset, count), "nothing was reported"
@@ -127,7 +113,7 @@ def _subject(dataset: Any, values: dict[str, Any]) -> ModelSummary:
     for kind in ("body", "joint", "point", "input"):
         names = dataset.variables[kind][:] if kind in dataset.dimensions else ()
         parts[f"{kind}_names"] = tuple(map(str, names))
-    for constant in CONSTANTS:
+    for constant in schema.CONSTANTS:
         if constant.dimensions[0] in dataset.dimensions:
             parts[constant.name] = np.asarray(dataset.variables[constant.name][:])
         else:
@@ -239,6 +225,6 @@ class LazyArrays(Arrays):
                 f"cannot read {file}: {name} has the shape {values.shape}, not {shape}"
             )
         if name != U_ERROR.name:  # an estimate may hold NaN
-            check_numbers(file, name, values)
+            validate.check_numbers(file, name, values)
         values.flags.writeable = False
         return values

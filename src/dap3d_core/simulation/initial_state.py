@@ -7,12 +7,7 @@ import attrs
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene import Scene
-from dap3d_core.simulation.initial.assemble import (
-    Initial,
-    correct_initial,
-    correction_notes,
-    violation,
-)
+from dap3d_core.simulation.initial import assemble
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of
 
 if TYPE_CHECKING:
@@ -35,7 +30,7 @@ class InitialState:
     """
 
     u: Floats
-    initial: Initial | None
+    initial: assemble.Initial | None
     redundancy: Redundancy
     state: "StartState | None" = None
 
@@ -76,7 +71,7 @@ def find_start(
         evaluator.start(0.0, u, None if state is None else state.angles, given)
     if correct or (state is not None and state.is_interpolated):
         held = [evaluator.model.body_names.index(name) + 1 for name in hold]
-        initial = correct_initial(evaluator, u, hold=held, metric=metric)
+        initial = assemble.correct_initial(evaluator, u, hold=held, metric=metric)
         u = initial.u
     return InitialState(u, initial, redundancy_of(evaluator, u), state)
 
@@ -85,8 +80,8 @@ def start_notes(start: InitialState, evaluator: Evaluator, scene: Scene) -> list
     """Text on the correction of a start, or that it is off the constraints."""
     notes = list(start.state.notes) if start.state is not None else []
     if start.initial is not None:
-        return notes + correction_notes(start.initial, evaluator, scene)
-    position, velocity = violation(evaluator, start.u)
+        return notes + assemble.correction_notes(start.initial, evaluator, scene)
+    position, velocity = assemble.violation(evaluator, start.u)
     if max(position, velocity) <= OFF_CONSTRAINTS:
         return notes
     return [

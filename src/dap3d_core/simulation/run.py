@@ -17,14 +17,9 @@ from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.result import Computed, Result, ResultError, information
 from dap3d_core.result.post.ledger import UNSOLVED
 from dap3d_core.scene import Mistake, SceneError, Simulation
+from dap3d_core.simulation import handover
 from dap3d_core.simulation.errors import RedundantError, SimulationError
 from dap3d_core.simulation.failure.stall import refusal_notes
-from dap3d_core.simulation.handover import (
-    crossing_notes,
-    hand_over,
-    singular_failure_message,
-    stiffness_notes,
-)
 from dap3d_core.simulation.initial.singular_start import SingularStart
 from dap3d_core.simulation.initial.tolerances import motion_notes, rounding_notes
 from dap3d_core.simulation.initial_state import InitialState, start_notes
@@ -105,7 +100,7 @@ class Run(RunState):
         """
         try:
             self._integrate()
-            while hand_over(self):
+            while handover.hand_over(self):
                 self._integrate()
         except BaseException as error:
             self._interrupt(error)
@@ -117,7 +112,7 @@ class Run(RunState):
                 self.control.put_back()
         ended = self.present.status
         if ended not in (Status.FINISHED, Status.ENDED):
-            message = singular_failure_message(
+            message = handover.singular_failure_message(
                 why_stopped(self.evaluator, self.present, self.rank), self
             )
             self.notes.append(message)
@@ -335,9 +330,9 @@ class Run(RunState):
         notes += self.jumps.notes(self.present) if self.jumps is not None else []
         notes += event_notes(self.integrations, self.events())
         notes += refusal_notes(self.evaluator, self.integrations)
-        notes += crossing_notes(self.crossed)
+        notes += handover.crossing_notes(self.crossed)
         notes += stepping_notes(self.integrations, self.evaluator.model.length)
-        notes += stiffness_notes(self.integrations, self.settings.integrator)
+        notes += handover.stiffness_notes(self.integrations, self.settings.integrator)
         return notes + self._method_notes()
 
     def _method_notes(self) -> list[str]:

@@ -3,18 +3,10 @@
 Pairs that may touch come from a grid of cells, and of the few larger shapes one by one.
 """
 
+from dap3d_core.assembly.collisions import solids
 from dap3d_core.assembly.collisions.boxes import boxes
 from dap3d_core.assembly.collisions.convex import touch_convex
 from dap3d_core.assembly.collisions.placed_shapes import PlacedShapes, place_shapes
-from dap3d_core.assembly.collisions.solids import (
-    at_plane,
-    ball_box,
-    balls,
-    capsule_box,
-    capsules,
-    sphere_capsule,
-    sphere_cylinder,
-)
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.scene.contacts.collision_shapes import (
@@ -182,20 +174,20 @@ def touch(s: PlacedShapes, i: int, j: int, count: int) -> int:
     if not has_formula(a, b):
         return touch_convex(s, i, j, count)
     if b == PLANE:
-        return at_plane(s, count, i, j)
+        return solids.at_plane(s, count, i, j)
     if a == SPHERE:
-        return balls(s, count, i, j, 0, c[0], c[1], c[2], s.size[i, 0], d[0], d[1], d[2],
+        return solids.balls(s, count, i, j, 0, c[0], c[1], c[2], s.size[i, 0], d[0], d[1], d[2],
                      s.size[j, 0])  # fmt: skip
     if a == CAPSULE and b == SPHERE:
-        return sphere_capsule(s, count, i, j)
+        return solids.sphere_capsule(s, count, i, j)
     if a == CAPSULE:
-        return capsules(s, count, i, j)
+        return solids.capsules(s, count, i, j)
     if a == CYLINDER and b == SPHERE:
-        return sphere_cylinder(s, count, i, j)
+        return solids.sphere_cylinder(s, count, i, j)
     if a == BOX and b == SPHERE:
-        return ball_box(s, count, i, j, 0, d[0], d[1], d[2], s.size[j, 0])
+        return solids.ball_box(s, count, i, j, 0, d[0], d[1], d[2], s.size[j, 0])
     if a == BOX and b == CAPSULE:
-        return capsule_box(s, count, i, j)
+        return solids.capsule_box(s, count, i, j)
     return boxes(s, count, i, j)
 
 

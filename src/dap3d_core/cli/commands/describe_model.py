@@ -11,12 +11,7 @@ from typing import TYPE_CHECKING, Any
 from dap3d_core.assembly.arrays import Floats
 from dap3d_core.formulations import PROJECT, RHS, WATCH
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.formulations.programs.scene_program import (
-    MOST_INSTRUCTIONS,
-    programmed,
-    python_loops,
-    write_program,
-)
+from dap3d_core.formulations.programs import scene_program
 from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.kernels.compiler.straight_line import StraightLine
 
@@ -45,7 +40,7 @@ class _Counting(StraightLine):
 
     def __init__(self, loops: Mapping[str, str]) -> None:
         """Args: name of a module -> the loop over instances of a type that it holds."""
-        super().__init__(MOST_INSTRUCTIONS)
+        super().__init__(scene_program.MOST_INSTRUCTIONS)
         self._loops = loops
         self.owner: dict[str, str] = {}
 
@@ -84,13 +79,13 @@ def operations(evaluator: Evaluator, time: float, state: Floats) -> list[dict[st
     written = [write(group.type_info, kind) for kind, group in evaluator.loop_groups]
     loops = {
         loop.__module__: source.name
-        for loop, source in zip(python_loops(evaluator), written, strict=True)
+        for loop, source in zip(scene_program.python_loops(evaluator), written, strict=True)
         if source is not None
     }
     found = []
-    for k in programmed(evaluator):
+    for k in scene_program.programmed(evaluator):
         tracer = _Counting(loops)
-        text, _ = write_program(evaluator, k, time, state, names, tracer=tracer)
+        text, _ = scene_program.write_program(evaluator, k, time, state, names, tracer=tracer)
         body = text.partition("program:")[2].partition("general:")[0].splitlines()
         parts = _counts(body, tracer.owner)
         total = {kind: sum(part[kind] for part in parts.values()) for kind in KINDS}

@@ -18,13 +18,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from dap3d_core.cli.process.streams import (
-    is_quiet,
-    json_stream,
-    leave_stderr,
-    leave_stdout,
-    prints_json,
-)
+from dap3d_core.cli.process import streams
 
 #: Bits of an integer; Python refuses to write more than some 14000 of them in decimal digits.
 LONGEST_INTEGER = 4096
@@ -52,7 +46,7 @@ class Terminal(Console):
 
     def _leave(self, error: OSError | None) -> None:
         self.quiet = True
-        leave_stderr() if self.stderr else leave_stdout(error)
+        streams.leave_stderr() if self.stderr else streams.leave_stdout(error)
 
     @property
     def wraps(self) -> bool:
@@ -218,19 +212,19 @@ def show_written(
 ) -> None:
     """Report a file that was written: its contents in words, or the same as JSON data."""
     byte_count = target.stat().st_size
-    if prints_json():
+    if streams.prints_json():
         about = {"file": str(target), "size_bytes": byte_count}
         print_json({**about, **data, "notes": list(notes)})
-    elif not is_quiet():
+    elif not streams.is_quiet():
         stderr().items(notes)
         stdout().say(f"{target} written ({size(byte_count)}): {contents}", whole=True)
 
 
 def show_data(data: Any, show: Callable[[Terminal], None], *written: str | Path | None) -> None:
     """Print data as JSON, or what ``show`` prints of it and the files that were written."""
-    if prints_json():
+    if streams.prints_json():
         print_json(data)
-    elif not is_quiet():
+    elif not streams.is_quiet():
         console = stdout()
         show(console)
         for target in filter(None, written):
@@ -240,11 +234,11 @@ def show_data(data: Any, show: Callable[[Terminal], None], *written: str | Path 
 def print_json(data: Any) -> None:
     """Print one JSON object to stdout: ASCII, numbers that are not finite as null."""
     try:
-        stream = json_stream()
+        stream = streams.json_stream()
         stream.write(json.dumps(json_value(data), indent=2, allow_nan=False) + "\n")
         stream.flush()
     except OSError as error:
-        leave_stdout(error)
+        streams.leave_stdout(error)
 
 
 def json_value(value: Any) -> Any:

@@ -4,15 +4,10 @@ import attrs
 import numpy as np
 
 from dap3d_core.formats.import_scene.spanning_tree import SpanningTree
+from dap3d_core.interface.formats import solids
 from dap3d_core.interface.formats.articulation import WORLD, Inertial, Link
 from dap3d_core.interface.formats.frames import IDENTITY, Frame
 from dap3d_core.interface.formats.remarks import FormatError, Remarks
-from dap3d_core.interface.formats.solids import (
-    balanced_inertia,
-    inertia_moved,
-    nearest_inertia,
-    total_inertia,
-)
 
 #: Mass and inertia of a link without any that moves, as a part of what its joint carries.
 STAND_IN = 1e-11
@@ -92,11 +87,11 @@ def rigid_groups(
     for group_ in groups.values():
         if group_.name != WORLD:
             parts = [
-                inertia_moved(_checked(link, remarks, balance_inertia), frame)
+                solids.inertia_moved(_checked(link, remarks, balance_inertia), frame)
                 for link, frame in group_.links
                 if link.inertial
             ]
-            group_.inertial = total_inertia(parts) if parts else Inertial(0.0)
+            group_.inertial = solids.total_inertia(parts) if parts else Inertial(0.0)
     _stand_in(tree, groups, member, stand_in, remarks)
     return groups, member
 
@@ -120,12 +115,12 @@ def _checked(link: Link, remarks: Remarks, balance_inertia: bool) -> Inertial:
     what = f"link {link.name}: no body has the principal moments of inertia {least:.4g}, "
     what += f"{middle:.4g}, {most:.4g}: "
     if balance_inertia:
-        text, J = "their mean replaces them", balanced_inertia(inertial.inertia)
+        text, J = "their mean replaces them", solids.balanced_inertia(inertial.inertia)
     elif least < -ASYMMETRY * scale:
         raise FormatError(f"{what}none is negative", link.place, "correct the file, or take their "
                           "mean with --balance-inertia (balance_inertia=True)")  # fmt: skip
     else:
-        J, lack = nearest_inertia(inertial.inertia), most - least - middle
+        J, lack = solids.nearest_inertia(inertial.inertia), most - least - middle
         text = f"the largest is at most the sum of the others, which are made {lack:.2g} more"
     remarks.translate(link.place, what + text, motion=True)
     return Inertial(inertial.mass, inertial.com, J)
@@ -164,14 +159,14 @@ def _carried(
     for name in reversed(tree.order):
         if name not in groups:
             continue
-        joint, total = tree.placing.get(name), total_inertia(parts[name])
+        joint, total = tree.placing.get(name), solids.total_inertia(parts[name])
         arm = total.com - (np.zeros(3) if joint is None else joint.in_child.r)
         mean = float(np.trace(total.inertia)) / 3.0 + total.mass * float(arm @ arm) * 2.0 / 3.0
         carried[name] = total.mass, mean
         if joint is not None:
             holder, frame = member[joint.parent]
             pose = frame @ joint.in_parent @ joint.in_child.inverse()
-            parts[holder].append(inertia_moved(total, pose))
+            parts[holder].append(solids.inertia_moved(total, pose))
     return carried
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from dap3d_core.formats.import_scene import shapes
 from dap3d_core.formats.import_scene.actuators import (
     NO_LIMITS,
     STOP_TIME,
@@ -25,12 +26,6 @@ from dap3d_core.formats.import_scene.joints import (
 )
 from dap3d_core.formats.import_scene.rigid_groups import STAND_IN, STEPPED, RigidGroup, rigid_groups
 from dap3d_core.formats.import_scene.scene_builder import Names, SceneBuilder, float_tuple
-from dap3d_core.formats.import_scene.shapes import (
-    MeshFiles,
-    add_collisions,
-    add_shapes,
-    bits_of_shapes,
-)
 from dap3d_core.formats.import_scene.spanning_tree import Placed, SpanningTree
 from dap3d_core.formats.import_scene.start import AGREE, SCALAR, couples, start_of
 from dap3d_core.interface.formats.articulation import WORLD, Articulation, Joint, Limits, Link
@@ -92,7 +87,7 @@ def scene_of(
     remarks: Remarks,
     options: ImportOptions | None = None,
     *,
-    meshes: MeshFiles | None = None,
+    meshes: shapes.MeshFiles | None = None,
     names: Names | None = None,
 ) -> Scene:
     """The scene of a model.
@@ -139,12 +134,12 @@ def scene_of(
             _add_body(builder, group, placed[group.name])
     _add_gravity(builder, model.gravity)
     _add_joints(builder, model)
-    bits = bits_of_shapes(builder, model) if options.contacts else {}
+    bits = shapes.bits_of_shapes(builder, model) if options.contacts else {}
     for group in groups.values():
         for link, _ in group.links:
-            add_shapes(builder, link, MeshFiles() if meshes is None else meshes, bits)
+            shapes.add_shapes(builder, link, shapes.MeshFiles() if meshes is None else meshes, bits)
     if options.contacts:
-        add_collisions(builder, model)
+        shapes.add_collisions(builder, model)
     return scene
 
 

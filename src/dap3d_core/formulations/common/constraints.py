@@ -8,14 +8,7 @@ As None it is known when the code is compiled, so that ``standard`` has no line 
 from collections.abc import Callable
 from typing import Any
 
-from dap3d_core.assembly.arrays import (
-    ACCELERATION,
-    EVEN,
-    LENGTH,
-    POSITION,
-    Floats,
-    System,
-)
+from dap3d_core.assembly.arrays import ACCELERATION, EVEN, LENGTH, POSITION, Floats, System
 from dap3d_core.assembly.evaluate import (  # noqa: F401  read by projection.py
     call_kinds,
     evaluate_forces,

@@ -2,15 +2,9 @@
 
 from typing import Any
 
+from dap3d_core.assembly import turns
 from dap3d_core.assembly.arrays import ANGLE, DOUBTFUL, KNOT, SCRATCH, SWITCH, Floats, System
 from dap3d_core.assembly.evaluate import call_kinds, place, place_state
-from dap3d_core.assembly.turns import (
-    doubtful_angles,
-    has_measured,
-    keep_turns,
-    measure_all,
-    needs_places,
-)
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 
@@ -25,8 +19,8 @@ def accepted(t: float, y: Floats, out: Floats, system: System, loops: Any) -> No
     if has_own:
         place(t, y, system, loops)
         count(t, y, y[:0], out, system, loops)
-    elif needs_places(system):
-        if out[0] <= 0.0 or not has_measured(t, system):
+    elif turns.needs_places(system):
+        if out[0] <= 0.0 or not turns.has_measured(t, system):
             place_state(y, system)
         count(t, y, y[:0], out, system, loops)
     else:
@@ -41,11 +35,11 @@ def count(t: float, y: Floats, unplaced: Floats, out: Floats, system: System, lo
     if counts_own_angles(system):
         call_kinds(ANGLE, ANGLE, t, system, loops, doubtful, out, out)
     if out[0] <= 0.0:
-        out[0] = doubtful[0] + doubtful_angles(t, unplaced, system, out[0] < 0.0)
+        out[0] = doubtful[0] + turns.doubtful_angles(t, unplaced, system, out[0] < 0.0)
         return
-    if not has_measured(t, system):
-        measure_all(t, unplaced, system)
-    keep_turns(t, y, system, out[0] > 1.0)
+    if not turns.has_measured(t, system):
+        turns.measure_all(t, unplaced, system)
+    turns.keep_turns(t, y, system, out[0] > 1.0)
 
 
 @compiled_into

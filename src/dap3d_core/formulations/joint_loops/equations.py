@@ -30,20 +30,7 @@ from dap3d_core.formulations.joint.multipliers import joint_multipliers
 from dap3d_core.formulations.joint.place import place_tree
 from dap3d_core.formulations.joint.reduce import reduce_nodes
 from dap3d_core.formulations.joint.spread import body_accelerations, spread_tree
-from dap3d_core.formulations.joint_loops import kept_rows, layout
-from dap3d_core.formulations.joint_loops.loads import (
-    carry_rows,
-    lacking_accelerations,
-    linearise_kept,
-    multiply_loads,
-    push_freedoms,
-)
-from dap3d_core.formulations.joint_loops.profile import (
-    PART,
-    factor_profile,
-    solve_profile,
-    weigh_kept_rows,
-)
+from dap3d_core.formulations.joint_loops import kept_rows, layout, loads, profile
 from dap3d_core.formulations.lsq import minimum_norm_multipliers
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled
@@ -61,12 +48,12 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     if has_friction(system):
         power = accelerate(t, system, loops, False)
     else:
-        linearise_kept(t, system, loops)
+        loads.linearise_kept(t, system, loops)
         power = reduce_nodes(system, system.force, True)
         factorise(system)
-        lacking_accelerations(system)
+        loads.lacking_accelerations(system)
         solve_kept(system)
-        push_freedoms(system)
+        loads.push_freedoms(system)
         power += power_of_kept_drivers(system)
     spread_tree(y, out, system)
     state_rates(t, out, system, loops)
@@ -76,16 +63,16 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
 @compiled
 def factorise(system: System) -> None:
     """Factors of the kept rows' matrix, of the inertias in ``tree.work``."""
-    carry_rows(system)
+    loads.carry_rows(system)
     factorise_anew(system, system.tree.kept.settings[layout.PART_OF_ROW])
 
 
 @compiled
 def factorise_anew(system: System, part: float) -> None:
     """The same of loads that rows have put already, by a part of their squares."""
-    multiply_loads(system)
-    weigh_kept_rows(system, part)
-    factor_profile(system)
+    loads.multiply_loads(system)
+    profile.weigh_kept_rows(system, part)
+    profile.factor_profile(system)
 
 
 @compiled
@@ -96,14 +83,15 @@ def solve_kept(system: System) -> None:
     factors of a smaller part take the place of these. They stay where rows contradict each other.
     """
     given = part = system.tree.kept.settings[layout.PART_OF_ROW]
-    left = first = solve_profile(system)
-    while left > CONVERGED and part > LEAST and given == PART:  # less asks for its pivots alone
+    left = first = profile.solve_profile(system)
+    # less than PART asks for its pivots alone
+    while left > CONVERGED and part > LEAST and given == profile.PART:
         part *= SMALLER
         factorise_anew(system, part)
-        left = solve_profile(system)
+        left = profile.solve_profile(system)
     if part < given and not left < SMALLER * first:
         factorise_anew(system, given)
-        solve_profile(system)
+        profile.solve_profile(system)
 
 
 @compiled
@@ -113,7 +101,7 @@ def accelerate(t: float, system: System, loops: Any, is_report: bool) -> float:
     The bodies are placed, and ``force`` is known. Reports at singular poses are counted.
     """
     power = linearise_tree(t, system, loops)
-    linearise_kept(t, system, loops)
+    loads.linearise_kept(t, system, loops)
     if not kept_rows.factorise_anyway(system, None) and is_report:
         system.settings[SINGULAR] += 1.0
     power += solve_with_friction(t, system, loops, solve)
@@ -125,9 +113,9 @@ def solve(system: System) -> None:
     """``acceleration`` and ``multipliers`` from the scaled forces in ``acceleration``."""
     sum_forces(system)
     reduce_nodes(system, system.tree.force, True)
-    lacking_accelerations(system)
+    loads.lacking_accelerations(system)
     solve_kept(system)
-    push_freedoms(system)
+    loads.push_freedoms(system)
     spread_tree(system.tree.slope, system.tree.slope, system)
     store_reactions(system)
     zero(system.multipliers)

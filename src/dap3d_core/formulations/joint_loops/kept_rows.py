@@ -15,23 +15,7 @@ from dap3d_core.formulations.joint.equations import normalise_rotations
 from dap3d_core.formulations.joint.place import place_tree, put
 from dap3d_core.formulations.joint.reduce import reduce_nodes
 from dap3d_core.formulations.joint.spread import spread_tree
-from dap3d_core.formulations.joint_loops import layout
-from dap3d_core.formulations.joint_loops.loads import (
-    carry_rows,
-    kept_residuals,
-    lacking_velocities,
-    linearise_kept,
-    multiply_loads,
-    push_freedoms,
-    rest,
-)
-from dap3d_core.formulations.joint_loops.profile import (
-    PART,
-    factor_profile,
-    pivot_lengths,
-    solve_profile,
-    weigh_kept_rows,
-)
+from dap3d_core.formulations.joint_loops import layout, loads, profile
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import R, V, W
 from dap3d_core.kernels.scalar_math import where
@@ -40,7 +24,7 @@ from dap3d_core.kernels.scalar_math import where
 #: the rows hold something themselves.
 LESS, HELD = 16.0, 10.0
 
-normalise, linearise = normalise_rotations, linearise_kept
+normalise, linearise = normalise_rotations, loads.linearise_kept
 
 
 @compiled_into
@@ -53,7 +37,7 @@ def place(t: float, y: Floats, system: System, loops: Any) -> None:
 @compiled_into
 def residuals(t: float, system: System, loops: Any) -> float:
     """C of the kept rows into ``residual``; the largest, m."""
-    kept_residuals(t, system, loops)
+    loads.kept_residuals(t, system, loops)
     return largest_weighted(system.residual, system.weight)
 
 
@@ -75,14 +59,14 @@ def factorise_anyway(system: System, part: float | None) -> bool:
     the start; ``part`` is not used.
     """
     reduce_nodes(system, system.force, True)
-    carry_rows(system)
-    multiply_loads(system)
-    weigh_kept_rows(system, system.tree.kept.settings[layout.PART_OF_ROW])
-    if factor_profile(system):
+    loads.carry_rows(system)
+    loads.multiply_loads(system)
+    profile.weigh_kept_rows(system, system.tree.kept.settings[layout.PART_OF_ROW])
+    if profile.factor_profile(system):
         return True
-    multiply_loads(system)
-    weigh_kept_rows(system, PART)
-    factor_profile(system)
+    loads.multiply_loads(system)
+    profile.weigh_kept_rows(system, profile.PART)
+    profile.factor_profile(system)
     return False
 
 
@@ -98,7 +82,7 @@ def displace(y: Floats, system: System) -> None:
 @compiled_into
 def velocity_residuals(system: System) -> float:
     """D v - nu of the kept rows into ``right``; the largest, m/s."""
-    lacking_velocities(system)
+    loads.lacking_velocities(system)
     return largest_lacking(system)
 
 
@@ -126,7 +110,7 @@ def change_velocities(y: Floats, system: System) -> float:
 @compiled_into
 def is_poor(t: float, system: System, loops: Any, part: float | None, lengths: Floats) -> bool:
     """True if the pose is close to a singular one."""
-    return pivot_lengths(system, lengths) > 0
+    return profile.pivot_lengths(system, lengths) > 0
 
 
 @compiled
@@ -138,9 +122,9 @@ def have_come_to_hold(system: System) -> bool:
     kept = system.tree.kept
     for j in range(kept.profile.shape[0]):
         kept.solution[j] = kept.matrix[kept.profile[j, layout.PLACE] + j]
-    multiply_loads(system)
-    weigh_kept_rows(system, kept.settings[layout.PART_OF_FACTORS] / LESS)
-    factor_profile(system)
+    loads.multiply_loads(system)
+    profile.weigh_kept_rows(system, kept.settings[layout.PART_OF_FACTORS] / LESS)
+    profile.factor_profile(system)
     for j in range(kept.profile.shape[0]):
         inverse = kept.matrix[kept.profile[j, layout.PLACE] + j]
         if kept.smallest[j] == 0.0 and inverse < HELD * kept.solution[j]:
@@ -161,9 +145,9 @@ def aim_at_positions(system: System) -> None:
 @compiled
 def spread_change(system: System) -> None:
     """The least change of motion that gives the rows ``right``: its rates into ``slope``."""
-    solve_profile(system)
-    rest(system)
-    push_freedoms(system)
+    profile.solve_profile(system)
+    loads.rest(system)
+    loads.push_freedoms(system)
     spread_tree(system.tree.slope, system.tree.slope, system)
 
 

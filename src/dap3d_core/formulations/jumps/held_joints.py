@@ -8,14 +8,7 @@ from typing import Any
 
 from dap3d_core.assembly.arrays import Floats, System, step_functions
 from dap3d_core.assembly.evaluate import copy, place
-from dap3d_core.formulations.common.constraints import (
-    PART,
-    acceleration_residual,
-    correct,
-    factorise_anyway,
-    linearise,
-    velocity_residuals,
-)
+from dap3d_core.formulations.common import constraints
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 #: Corrections of one solution. The first solves; the others are refinement and, with regularised
@@ -29,9 +22,9 @@ FACTOR, SOLVE = 0, 1
 def factor_rows(t: float, y: Floats, system: System, loops: Any, part: float | None) -> None:
     """D^ and its factors at a state, and D v - nu into ``residual``."""
     place(t, y, system, loops)
-    linearise(t, system, loops)
-    velocity_residuals(system)
-    factorise_anyway(system, part)
+    constraints.linearise(t, system, loops)
+    constraints.velocity_residuals(system)
+    constraints.factorise_anyway(system, part)
 
 
 @compiled
@@ -43,7 +36,7 @@ def factor_independent(t: float, y: Floats, out: Floats, system: System, loops: 
 @compiled
 def factor_regularised(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """``factor_rows`` of rows that may depend on each other."""
-    factor_rows(t, y, system, loops, PART)
+    factor_rows(t, y, system, loops, constraints.PART)
 
 
 @compiled
@@ -61,8 +54,8 @@ def solve_held(t: float, y: Floats, out: Floats, system: System, loops: Any) -> 
     for k in range(rows):
         gamma[k], out[size + k] = out[size + k], 0.0
     for _ in range(CORRECTIONS):
-        acceleration_residual(system)
-        correct(system)
+        constraints.acceleration_residual(system)
+        constraints.correct(system)
         for k in range(size):
             x[k] += system.change[k]
         for k in range(rows):

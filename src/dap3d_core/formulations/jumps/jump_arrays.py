@@ -8,13 +8,7 @@ import numpy as np
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.loop_source import JUMP_KINDS, row_count, stride
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.kernels.runtime.array_struct import (
-    Arrays,
-    IntegerMatrix,
-    Matrix,
-    Scalar,
-    Tensor,
-)
+from dap3d_core.kernels.runtime.array_struct import Arrays, IntegerMatrix, Matrix, Scalar, Tensor
 from dap3d_core.model import Group
 
 #: Columns of ``rows``: place of the change among the numbers of the loops, of the first entry of

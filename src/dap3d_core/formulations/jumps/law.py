@@ -21,15 +21,8 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import Floats
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
+from dap3d_core.formulations.jumps import jump_arrays
 from dap3d_core.formulations.jumps.held_joints import held_functions
-from dap3d_core.formulations.jumps.jump_arrays import (
-    BEFORE,
-    CROSSING,
-    NOW,
-    SIDE,
-    JumpArrays,
-    JumpElements,
-)
 from dap3d_core.formulations.jumps.rounds import jump
 
 #: Rounds of one instant.
@@ -74,7 +67,7 @@ class JumpLaw:
     def __init__(self, evaluator: Evaluator) -> None:
         """Args: the evaluator of the model."""
         self._evaluator = in_bodies = evaluator
-        self.elements = JumpElements(evaluator)
+        self.elements = jump_arrays.JumpElements(evaluator)
         if not evaluator.coordinates.are_of_bodies:  # they have no factors
             in_bodies = Evaluator(evaluator.model, "lsq")
         self._held = in_bodies
@@ -82,11 +75,11 @@ class JumpLaw:
         self._functions = held_functions(has_rows, redundant)
 
     @cached_property
-    def arrays(self) -> JumpArrays:
+    def arrays(self) -> jump_arrays.JumpArrays:
         """What the law works on where no rows are given."""
         return self.elements.arrays(self._evaluator, self._held, 0, ROUNDS)
 
-    def arguments(self, arrays: JumpArrays) -> tuple[Any, ...]:
+    def arguments(self, arrays: jump_arrays.JumpArrays) -> tuple[Any, ...]:
         """Arguments of the compiled law behind the time."""
         one, held = self._evaluator, self._held
         return arrays, one.system, one.loops, self._functions, held.system, held.loops
@@ -124,16 +117,16 @@ class JumpLaw:
         j.given_count, j.follows = len(given or ()), int(given is not None)
         j.soon, j.has_sides = soon, int(sides is not None)
         j.y[:] = y
-        j.switches[SIDE] = 0.0 if sides is None else sides
-        j.switches[CROSSING] = crossing
+        j.switches[jump_arrays.SIDE] = 0.0 if sides is None else sides
+        j.switches[jump_arrays.CROSSING] = crossing
         self._held.set_inputs(evaluator.inputs)
         jump(float(t), *self.arguments(j))
         if j.missed != -1:
             raise ImpossibleJumpError(names[j.missed] if j.missed >= 0 else "")
         evaluator.states = states = j.y[evaluator.model.integrated_layout["states"]].copy()
         acted = [names[k] for k in np.flatnonzero(j.acting).tolist()]
-        dv = j.v[NOW] - j.v[BEFORE]
+        dv = j.v[jump_arrays.NOW] - j.v[jump_arrays.BEFORE]
         return Jump(
             j.y.copy(), dv, j.work, j.exchanged, states, tuple(dict.fromkeys(acted)),
-            j.switches[SIDE].copy(), j.rounds,
+            j.switches[jump_arrays.SIDE].copy(), j.rounds,
         )  # fmt: skip

@@ -7,38 +7,9 @@ import numpy as np
 from dap3d_core.assembly.arrays import IMPULSE, KNOT, RESET, SWITCH, System, velocity_offset
 from dap3d_core.assembly.evaluate import call_kinds, copy, place, zero
 from dap3d_core.assembly.metric import put_scaled
+from dap3d_core.formulations.jumps import jump_arrays as at
 from dap3d_core.formulations.jumps.held_joints import FACTOR, SOLVE
-from dap3d_core.formulations.jumps.jump_arrays import (
-    BEFORE,
-    BODY,
-    CHANGE,
-    CROSSING,
-    ELEMENT,
-    ENTRY,
-    FASTEST,
-    KICK,
-    KICK_BODY,
-    KICK_ELEMENT,
-    KICK_SLOTS,
-    KICK_SWITCH,
-    KICK_SWITCHES,
-    NOW,
-    OLD,
-    OWN,
-    PUSHES,
-    RESET_ELEMENT,
-    RESET_STATE,
-    RESET_STATES,
-    RESET_SWITCH,
-    RESET_SWITCHES,
-    SIDE,
-    SLOTS,
-    STEP,
-    VALUE,
-    JumpArrays,
-)
-from dap3d_core.formulations.jumps.jump_arrays import SWITCH as FIRST_SWITCH
-from dap3d_core.formulations.jumps.jump_arrays import SWITCHES as SWITCH_COUNT
+from dap3d_core.formulations.jumps.jump_arrays import JumpArrays
 from dap3d_core.formulations.jumps.multipliers import find_impulses, missed_row
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
@@ -90,12 +61,12 @@ def begin(
     for b in range(1, system.body.shape[0]):
         for k in range(6):
             v = system.body[b, 12 + k]
-            j.v[NOW, 6 * b - 6 + k] = j.v[BEFORE, 6 * b - 6 + k] = v
-            j.v[FASTEST, 6 * b - 6 + k] = abs(v)
+            j.v[at.NOW, 6 * b - 6 + k] = j.v[at.BEFORE, 6 * b - 6 + k] = v
+            j.v[at.FASTEST, 6 * b - 6 + k] = abs(v)
     evaluate_switches(t, j, system, loops)
     if j.has_sides == 0:
         for k in range(j.switches.shape[1]):
-            j.switches[SIDE, k] = np.sign(j.switches[VALUE, k])
+            j.switches[at.SIDE, k] = np.sign(j.switches[at.VALUE, k])
 
 
 @compiled
@@ -111,7 +82,7 @@ def hold(t: float, j: JumpArrays, of_held: Any, held: System, held_loops: Any) -
 def evaluate_switches(t: float, j: JumpArrays, system: System, loops: Any) -> None:
     """All switches of the model, bodies being placed."""
     zero(j.counts)
-    call_kinds(SWITCH, KNOT, t, system, loops, j.switches[VALUE], j.counts, j.counts)
+    call_kinds(SWITCH, KNOT, t, system, loops, j.switches[at.VALUE], j.counts, j.counts)
 
 
 @compiled
@@ -120,9 +91,9 @@ def crossings_behind(t: float, j: JumpArrays, system: System, loops: Any) -> int
     s, found = j.switches, 0
     evaluate_switches(t, j, system, loops)
     for k in range(s.shape[1]):
-        s[CROSSING, k] = 0.0
-        if (j.jumps[k] != 0) & (s[VALUE, k] * s[SIDE, k] < 0.0):
-            s[CROSSING, k] = s[SIDE, k] = np.sign(s[VALUE, k])
+        s[at.CROSSING, k] = 0.0
+        if (j.jumps[k] != 0) & (s[at.VALUE, k] * s[at.SIDE, k] < 0.0):
+            s[at.CROSSING, k] = s[at.SIDE, k] = np.sign(s[at.VALUE, k])
             found = 1
     return found
 
@@ -132,7 +103,7 @@ def has_crossed(j: JumpArrays, first: int, count: int) -> int:
     """Whether one of some switches of an element has just changed its sign."""
     found = 0
     for k in range(first, first + count):
-        found |= j.switches[CROSSING, j.of_switch[k]] != 0.0
+        found |= j.switches[at.CROSSING, j.of_switch[k]] != 0.0
     return found
 
 
@@ -140,7 +111,7 @@ def has_crossed(j: JumpArrays, first: int, count: int) -> int:
 def find_rows(t: float, j: JumpArrays, system: System, loops: Any) -> int:
     """Impulses P, and the rows that are to jump; whether there are any."""
     for k in range(j.order.shape[0]):
-        j.of_loop[k] = j.switches[CROSSING, j.order[k]]
+        j.of_loop[k] = j.switches[at.CROSSING, j.order[k]]
     zero(j.numbers)
     zero(j.counts)
     zero(j.P)
@@ -151,11 +122,11 @@ def find_rows(t: float, j: JumpArrays, system: System, loops: Any) -> int:
     zero(j.P[:6])
     j.row_count = 0
     for k in range(j.rows.shape[0]):
-        change = j.numbers[j.rows[k, CHANGE]]
+        change = j.numbers[j.rows[k, at.CHANGE]]
         if change != 0.0:
             fill_row(j, k, j.G[j.row_count], change)
             if takes_part(j, k, j.G[j.row_count]):
-                add_row(j, k, j.rows[k, PUSHES])
+                add_row(j, k, j.rows[k, at.PUSHES])
     if j.rounds == 0:
         for k in range(j.given_count):
             copy(j.G[j.row_count], j.given[k])
@@ -168,15 +139,15 @@ def find_rows(t: float, j: JumpArrays, system: System, loops: Any) -> int:
 def kick(j: JumpArrays, k: int) -> int:
     """Add the impulses of an element that has crossed; whether it has some."""
     row, found = j.kicks[k], 0
-    if has_crossed(j, row[KICK_SWITCH], row[KICK_SWITCHES]) == 0:
+    if has_crossed(j, row[at.KICK_SWITCH], row[at.KICK_SWITCHES]) == 0:
         return 0
-    for n in range(6 * row[KICK_SLOTS]):
-        found |= j.numbers[row[KICK] + n] != 0.0
+    for n in range(6 * row[at.KICK_SLOTS]):
+        found |= j.numbers[row[at.KICK] + n] != 0.0
     if found != 0:
-        j.acting[row[KICK_ELEMENT]] = 1
-        for n in range(6 * row[KICK_SLOTS]):
-            body = j.bodies[row[KICK_BODY] + n // 6]
-            j.P[6 * body + n % 6] += j.numbers[row[KICK] + n]
+        j.acting[row[at.KICK_ELEMENT]] = 1
+        for n in range(6 * row[at.KICK_SLOTS]):
+            body = j.bodies[row[at.KICK_BODY] + n // 6]
+            j.P[6 * body + n % 6] += j.numbers[row[at.KICK] + n]
     return found
 
 
@@ -185,8 +156,8 @@ def fill_row(j: JumpArrays, k: int, G: Floats, change: float) -> None:
     """A row of an element in global axes, and its change."""
     row = j.rows[k]
     zero(G)
-    for n in range(row[SLOTS]):
-        body, entry = j.bodies[row[BODY] + n], row[ENTRY] + n * row[STEP]
+    for n in range(row[at.SLOTS]):
+        body, entry = j.bodies[row[at.BODY] + n], row[at.ENTRY] + n * row[at.STEP]
         if body > 0:
             for c in range(6):
                 G[6 * body + c] += j.numbers[entry + c]
@@ -197,15 +168,15 @@ def fill_row(j: JumpArrays, k: int, G: Floats, change: float) -> None:
 def takes_part(j: JumpArrays, k: int, G: Floats) -> bool:
     """True if a row crosses, is closed, or closes soon."""
     row, s, near = j.rows[k], j.switches, 0
-    if row[OWN] >= 0:
+    if row[at.OWN] >= 0:
         rate = 0.0
         for c in range(6, j.P.shape[0]):
-            rate += G[c] * j.v[NOW, c - 6]
-        near |= s[VALUE, row[OWN]] <= -j.soon * rate
-    for n in range(row[FIRST_SWITCH], row[FIRST_SWITCH] + row[SWITCH_COUNT]):
+            rate += G[c] * j.v[at.NOW, c - 6]
+        near |= s[at.VALUE, row[at.OWN]] <= -j.soon * rate
+    for n in range(row[at.SWITCH], row[at.SWITCH] + row[at.SWITCHES]):
         q = j.of_switch[n]
-        is_near = (s[CROSSING, q] != 0.0) | (s[VALUE, q] <= 0.0) | (s[SIDE, q] == 0.0)
-        near |= is_near & ((row[OWN] < 0) | (row[OWN] == q))
+        is_near = (s[at.CROSSING, q] != 0.0) | (s[at.VALUE, q] <= 0.0) | (s[at.SIDE, q] == 0.0)
+        near |= is_near & ((row[at.OWN] < 0) | (row[at.OWN] == q))
     return near != 0
 
 
@@ -214,7 +185,7 @@ def add_row(j: JumpArrays, k: int, pushes: int) -> None:
     """Keep the row of the round that was filled last, if its change is no rounding."""
     q, size = j.row_count, 0.0
     for c in range(6, j.P.shape[0]):
-        size += abs(j.G[q, c]) * j.v[FASTEST, c - 6]
+        size += abs(j.G[q, c]) * j.v[at.FASTEST, c - 6]
     if abs(j.G[q, j.P.shape[0]]) > RATE_ROUNDING * size:
         j.which[q], j.pushes[q] = k, pushes
         j.row_count = q + 1
@@ -237,7 +208,7 @@ def meet(j: JumpArrays, of_held: Any, held: System, held_loops: Any) -> int:
     find_impulses(m, j.A, j.Lam, j.pushes, j.acts, j.space)
     missed = missed_row(m, j.A, j.Lam, j.pushes)
     if missed >= 0:
-        j.missed = j.rows[j.which[missed], ELEMENT] if j.which[missed] >= 0 else -2
+        j.missed = j.rows[j.which[missed], at.ELEMENT] if j.which[missed] >= 0 else -2
         return 0
     for q in range(m):
         for c in range(size):
@@ -292,24 +263,24 @@ def take(j: JumpArrays, held: System) -> int:
         for c in range(3):
             linear = m[0] * x[c]
             turning = m[7 + 3 * c] * x[3] + m[8 + 3 * c] * x[4] + m[9 + 3 * c] * x[5]
-            v[OLD, o + c], v[OLD, o + 3 + c] = v[NOW, o + c], v[NOW, o + 3 + c]
-            v[NOW, o + c] += linear
-            v[NOW, o + 3 + c] += turning
+            v[at.OLD, o + c], v[at.OLD, o + 3 + c] = v[at.NOW, o + c], v[at.NOW, o + 3 + c]
+            v[at.NOW, o + c] += linear
+            v[at.NOW, o + 3 + c] += turning
             j.y[first + o + c] += linear
             for i in range(3):
                 j.y[first + o + 3 + i] += s[3 + 3 * c + i] * turning
             changes |= (linear != 0.0) | (turning != 0.0)
     work, exchanged = 0.0, 0.0
     for c in range(size - 6):
-        mean = 0.5 * (v[OLD, c] + v[NOW, c])
+        mean = 0.5 * (v[at.OLD, c] + v[at.NOW, c])
         work += j.P[c + 6] * mean
         exchanged += abs(j.P[c + 6] * mean)
-        v[FASTEST, c] = max(v[FASTEST, c], abs(v[NOW, c]))
+        v[at.FASTEST, c] = max(v[at.FASTEST, c], abs(v[at.NOW, c]))
     for q in range(j.row_count):
         Lam, before, after = j.Lam[1, q] / j.length[q], 0.0, 0.0
         for c in range(size - 6):
-            before += j.G[q, c + 6] * v[OLD, c]
-            after += j.G[q, c + 6] * v[NOW, c]
+            before += j.G[q, c + 6] * v[at.OLD, c]
+            after += j.G[q, c + 6] * v[at.NOW, c]
         work += 0.5 * Lam * (before + after)
         exchanged += 0.5 * abs(Lam) * (abs(before) + abs(after))
         remember(j, q, Lam)
@@ -327,7 +298,7 @@ def remember(j: JumpArrays, q: int, Lam: float) -> None:
     """Take note of a row that has taken part."""
     k = j.which[q]
     if (k >= 0) & (Lam != 0.0):
-        j.acting[j.rows[k, ELEMENT]] = 1
+        j.acting[j.rows[k, at.ELEMENT]] = 1
     if (k >= 0) & (j.pushes[q] != 0):
         j.is_touched[k] = 1
         copy(j.touched[k], j.G[q])
@@ -341,20 +312,20 @@ def reset(
     count, found = system.states.shape[0], 0
     first = j.y.shape[0] - 1 - count
     for k in range(j.resets.shape[0]):
-        found |= has_crossed(j, j.resets[k, RESET_SWITCH], j.resets[k, RESET_SWITCHES])
+        found |= has_crossed(j, j.resets[k, at.RESET_SWITCH], j.resets[k, at.RESET_SWITCHES])
     if found == 0:
         return 0
     for k in range(j.reset_order.shape[0]):
-        j.of_loop[k] = j.switches[CROSSING, j.reset_order[k]]
+        j.of_loop[k] = j.switches[at.CROSSING, j.reset_order[k]]
     for k in range(count):
         j.numbers[k] = j.y[first + k]
     zero(j.counts)
     call_kinds(RESET, RESET, t, system, loops, j.numbers, j.counts, j.of_loop)
     for k in range(j.resets.shape[0]):
         row = j.resets[k]
-        if has_crossed(j, row[RESET_SWITCH], row[RESET_SWITCHES]) != 0:
-            j.acting[row[RESET_ELEMENT]] = 1
-            for n in range(row[RESET_STATE], row[RESET_STATE] + row[RESET_STATES]):
+        if has_crossed(j, row[at.RESET_SWITCH], row[at.RESET_SWITCHES]) != 0:
+            j.acting[row[at.RESET_ELEMENT]] = 1
+            for n in range(row[at.RESET_STATE], row[at.RESET_STATE] + row[at.RESET_STATES]):
                 j.y[first + n] = j.numbers[n]
     hold(t, j, of_held, held, held_loops)
     zero(j.P)
@@ -377,7 +348,7 @@ def stop(
             for c in range(size):
                 j.G[found, c] = j.touched[k, c]
                 if c >= 6:
-                    change -= j.touched[k, c] * j.v[NOW, c - 6]
+                    change -= j.touched[k, c] * j.v[at.NOW, c - 6]
             j.G[found, size], j.which[found], j.pushes[found] = change, k, 1
             found += 1
     j.row_count = found

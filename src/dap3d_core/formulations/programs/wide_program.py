@@ -20,14 +20,7 @@ from dap3d_core.formulations.joint.half_angles import LARGEST, largest_angle, sm
 from dap3d_core.formulations.joint.place import place_nodes
 from dap3d_core.formulations.joint.reduce import reduce_tree
 from dap3d_core.formulations.joint.spread import spread_tree
-from dap3d_core.formulations.programs.scene_program import (
-    MOST_INSTRUCTIONS,
-    constant_numbers,
-    constant_parts,
-    name_of,
-    programmed,
-    results,
-)
+from dap3d_core.formulations.programs import scene_program
 from dap3d_core.formulations.programs.symbolic_arrays import SymbolicSystem, Varied
 from dap3d_core.formulations.programs.ways import Results, merged
 from dap3d_core.formulations.wide_rates import SIGNATURE, Rates, WideRates
@@ -70,7 +63,7 @@ def write_wide(
         TraceError: the program would be too long.
         CompileError: an evaluation leaves something to the next one.
     """
-    tracer = StraightLine(MOST_INSTRUCTIONS)
+    tracer = StraightLine(scene_program.MOST_INSTRUCTIONS)
     members = [name for name, _ in Rates.type_of().members]
 
     def trace(state: Floats) -> tuple[Results, Any]:
@@ -78,7 +71,7 @@ def write_wide(
         given = Rates.of(time, state, evaluator)
         rates = system.symbolic(given, lambda: "%rates", "rates.")
         outcome = np.array([1.0, *np.zeros(given.outcome.size - 1)], dtype=object)
-        out = results(evaluator, k, rates.t[0], rates.y, outcome, system.struct)
+        out = scene_program.results(evaluator, k, rates.t[0], rates.y, outcome, system.struct)
         if system.stores():
             raise CompileError("an evaluation leaves something to the next one")
         found, places = {RESULTS[k]: out} | ({"y": rates.y} if k == PROJECT else {}), []
@@ -131,11 +124,11 @@ def program_rates(
     Raises:
         CompileError, TraceError: the scene has none; says why.
     """
-    numbers = constant_numbers(constant_parts(evaluator, varied))
-    name = name_of(evaluator, state.size, numbers, varied)
+    numbers = scene_program.constant_numbers(scene_program.constant_parts(evaluator, varied))
+    name = scene_program.name_of(evaluator, state.size, numbers, varied)
 
     functions = {}
-    for k in programmed(evaluator):
+    for k in scene_program.programmed(evaluator):
         ways = partial(write_wide, evaluator, k, time, state, varied=varied)
         write = partial(_write_some, ways, others if k == PROJECT else ())
         with nullcontext() if k == RHS else suppress(CompileError, TraceError):

@@ -30,12 +30,7 @@ from dap3d_core.assembly.arrays import (
 from dap3d_core.assembly.evaluate import copy, evaluate_forces, put_rates, zero
 from dap3d_core.assembly.metric import in_body_axes, scaled, scaled_moment, unscaled
 from dap3d_core.assembly.state_update import add_displacement
-from dap3d_core.formulations.common.constraints import (
-    linearise,
-    power_of_drivers,
-    residuals,
-    velocity_residuals,
-)
+from dap3d_core.formulations.common import constraints
 from dap3d_core.formulations.common.friction import (
     apply_friction,
     has_friction,
@@ -111,19 +106,19 @@ def evaluate_stage(
     for k in range(x.shape[0]):
         x[k] = -multipliers[1, k]
     power = evaluate_forces(t, y, system, loops)
-    linearise(t, system, loops)
+    constraints.linearise(t, system, loops)
     if has_friction(system):
         store_applied_forces(system)
         power += apply_friction(t, system, loops)
     add_transposed(system.blocks, system.D, x, -1.0, system.acceleration)
-    put_rates(t, y, power + power_of_drivers(system), out, system, loops)
+    put_rates(t, y, power + constraints.power_of_drivers(system), out, system, loops)
     zero(system.change)
     add_transposed(system.blocks, system.D, mu, 1.0, system.change)
     add_displacement(y, system.metric, system.change, out)
-    residuals(t, system, loops)
+    constraints.residuals(t, system, loops)
     for k in range(x.shape[0]):
         rows[0, k] = system.residual[k] if held[k] != 0 else mu[k]
-    velocity_residuals(system)
+    constraints.velocity_residuals(system)
     copy(rows[1], system.residual)
 
 

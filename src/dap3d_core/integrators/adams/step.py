@@ -18,6 +18,7 @@ import numpy as np
 
 from dap3d_core.assembly.evaluate import zero
 from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.integrators.stepping import step_control
 from dap3d_core.integrators.stepping.event_location import (
     end_is_across,
     is_sample_across,
@@ -27,18 +28,6 @@ from dap3d_core.integrators.stepping.event_location import (
 from dap3d_core.integrators.stepping.integration_state import Function, IntegrationState
 from dap3d_core.integrators.stepping.output import project_state
 from dap3d_core.integrators.stepping.rounding import record_failure
-from dap3d_core.integrators.stepping.step_control import (
-    EPSILON,
-    FROM_END,
-    LARGEST,
-    STEP_FOR_TURNS,
-    STRETCH,
-    advance_by,
-    first_step,
-    step_floor,
-    turns_are_certain,
-    work_error,
-)
 from dap3d_core.integrators.stepping.switch_values import evaluate
 from dap3d_core.integrators.stepping.vector_ops import all_finite, scaled_beyond, scaled_largest
 from dap3d_core.kernels.array_types import Floats
@@ -231,7 +220,9 @@ def advance_adams(
 ) -> None:
     """Integrate as ``runge_kutta.advance`` does; functions and budget as there."""
     first = work.differences[0]
-    advance_by(step, state_at, work, first, functions, system, loops, budget, FROM_END)
+    step_control.advance_by(
+        step, state_at, work, first, functions, system, loops, budget, step_control.FROM_END
+    )
 
 
 @compiled
@@ -253,7 +244,9 @@ def begin(work: AdamsState, rhs: Function, system: Any, loops: Any) -> None:
         return
     if work.h == 0.0:
         longest = FIRST_PART * (work.times[-1] - work.times[0])
-        work.h = with_slopes(min(first_step(work, f, rhs, system, loops), longest), 0.0)
+        work.h = with_slopes(
+            min(step_control.first_step(work, f, rhs, system, loops), longest), 0.0
+        )
     zero(f[1])
     for j in range(ROWS):
         work.table[PSI, j] = j * work.h
@@ -270,7 +263,7 @@ def step(work: AdamsState, functions: Any, system: Any, loops: Any) -> None:
             return
     t, t_end, k = work.t, work.times[-1], work.next_order
     h = with_slopes(min(work.h, work.longest_step), 0.0)  # chosen: not to be differentiated
-    end = t_end if t + STRETCH * h >= t_end else t + h
+    end = t_end if t + step_control.STRETCH * h >= t_end else t + h
     t1 = min(end, work.step_limit)
     h = t1 - t
     if work.switch_count != 0:
@@ -299,11 +292,11 @@ def step(work: AdamsState, functions: Any, system: Any, loops: Any) -> None:
         if failure != at.RUNNING:
             reject(work, t1, h, 1, 0.1, failure)
         elif complete_step(work, t1, rhs, watch, system, loops):
-            if turns_are_certain(work, t1, accepted, system, loops):
+            if step_control.turns_are_certain(work, t1, accepted, system, loops):
                 accept(work, t1, k, here, below, lower)
             else:
-                reject(work, t1, h, k, STEP_FOR_TURNS, at.STEP_FLOOR)
-    elif error <= LARGEST:
+                reject(work, t1, h, k, step_control.STEP_FOR_TURNS, at.STEP_FLOOR)
+    elif error <= step_control.LARGEST:
         record_failure(work, error, h, work.failure_count != 0)
         work.failure_count += 1
         factor = SLOWEST
@@ -321,14 +314,14 @@ def error_of(work: AdamsState, t1: float, h: float, k: int, size: float) -> floa
     table, change, rates = work.table, work.state[at.SCRATCH], work.scaled[ROWS - 1]
     weight = h * abs(table[G_ROW, k - 1] - table[G_ROW, k])
     error = weight * size
-    if 1.0 < error <= LARGEST and h * SLOWEST < step_floor(work):
+    if 1.0 < error <= step_control.LARGEST and h * SLOWEST < step_control.step_floor(work):
         y, trial, f0 = work.state[at.Y], work.state[at.TRIAL], work.differences[0]
-        doubt = EPSILON * max(abs(work.t), abs(t1))
+        doubt = step_control.EPSILON * max(abs(work.t), abs(t1))
         found = scaled_beyond(
             change, y, trial, f0, rates, doubt, work.error_size, work.rtol, work.tolerance
         )
         error = min(error, error * (found / size))
-    of_work = work_error(work, h, weight * change[change.size - 1])
+    of_work = step_control.work_error(work, h, weight * change[change.size - 1])
     return where(of_work > error, of_work, error)
 
 
@@ -412,7 +405,7 @@ def plan(work: AdamsState, h: float, k: int, here: float, below: float, lower: b
         factor = 1.0
         if error > PLANNED:
             factor = max(SLOWEST, min(STEADY, (PLANNED / error) ** (1.0 / (order + 1))))
-    work.h = max(h * factor, step_floor(work))
+    work.h = max(h * factor, step_control.step_floor(work))
 
 
 @compiled
@@ -421,5 +414,5 @@ def reject(work: AdamsState, t1: float, h: float, order: int, factor: float, cau
     work.rejected_count += 1
     work.is_starting, work.equal_steps, work.next_order = 0, 0, order
     work.h = h * factor
-    if work.h < step_floor(work):
+    if work.h < step_control.step_floor(work):
         work.t_stop, work.status = t1, cause

@@ -15,12 +15,7 @@ from dap3d_core.assembly.collisions.placed_shapes import (
 from dap3d_core.formulations.contacts.contact_table import ContactTable
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.kernels.runtime.array_struct import (
-    Arrays,
-    IntegerMatrix,
-    Matrix,
-    Scalar,
-)
+from dap3d_core.kernels.runtime.array_struct import Arrays, IntegerMatrix, Matrix, Scalar
 from dap3d_core.model import Model
 
 #: Contacts that there is room for at first, besides those declared.

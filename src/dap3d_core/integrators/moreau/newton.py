@@ -19,12 +19,7 @@ import math
 from dap3d_core.assembly.evaluate import copy
 from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import DECLARED, put_speeds, velocity_of
-from dap3d_core.integrators.moreau.matrix import (
-    assemble,
-    factor,
-    is_factored,
-    solve_factored,
-)
+from dap3d_core.integrators.moreau.matrix import assemble, factor, is_factored, solve_factored
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 

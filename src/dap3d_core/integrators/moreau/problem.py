@@ -8,13 +8,10 @@ one does, and each is solved as if it were alone.
 # mypy: disable-error-code="no-any-return"
 
 from dap3d_core.assembly.evaluate import copy
+from dap3d_core.integrators.moreau import reduced
 from dap3d_core.integrators.moreau.arrays import CONE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import put_inertia, put_speeds
-from dap3d_core.integrators.moreau.gauss_seidel import (
-    copy_impulses,
-    sweep_bodies,
-    sweep_contacts,
-)
+from dap3d_core.integrators.moreau.gauss_seidel import copy_impulses, sweep_bodies, sweep_contacts
 from dap3d_core.integrators.moreau.matrix import lay_out
 from dap3d_core.integrators.moreau.newton import (
     TINY,
@@ -25,14 +22,6 @@ from dap3d_core.integrators.moreau.newton import (
     rim_of,
     solve_round,
     times_inverse,
-)
-from dap3d_core.integrators.moreau.reduced import (
-    LEAST,
-    LESS,
-    factor_joints,
-    meet_joints,
-    put_felt,
-    reduced_round,
 )
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
@@ -180,7 +169,7 @@ def solve_group(s: StepArrays, tolerance: float) -> bool:
         aim = RESIDUAL_ROUNDING if few and tolerance < NEAR else tolerance
         s.residual = 1e300
         if joined and 3 * s.chosen_count <= s.small_step.size:  # few beside joints: alone
-            if not factor_joints(s):
+            if not reduced.factor_joints(s):
                 return False
             s.residual = newton(s, aim, True)
             if s.residual <= aim:
@@ -257,9 +246,9 @@ def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
     m, best = s.chosen_count, s.residual
     copy_impulses(s.x, s.y, s.kept, s.y_kept, s.contact_count)
     for _ in range(HELD_ROUNDS):
-        if not factor_joints(s):
+        if not reduced.factor_joints(s):
             return False
-        put_felt(s, ANSWERED)
+        reduced.put_felt(s, ANSWERED)
         for p in range(m):
             c = s.chosen[p]
             own = s.own_held[c]
@@ -269,7 +258,7 @@ def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
             felt = own[0] if s.kind[c] == CONE else own[0] + own[4] + own[8]
             own[0] = 0.0 if felt * s.r[c] < HELD else max(own[0], TINY)
         for _ in range(MET):
-            meet_joints(s)
+            reduced.meet_joints(s)
         put_velocities(s, s.v)
         for p in range(m):
             c = s.chosen[p]
@@ -278,7 +267,7 @@ def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
         sweep_contacts(s.chosen[:m], s.felt, s.own_held, s.u, s.kind, s.under, s.mu, s.rim,
                        s.x, SWEEPS, aim)  # fmt: skip
         for _ in range(MET):
-            meet_joints(s)
+            reduced.meet_joints(s)
         if not lay_out(s, s.dense_size):
             return False
         s.residual = newton(s, aim, False)
@@ -304,20 +293,20 @@ def newton(s: StepArrays, tolerance: float, is_reduced: bool, raises: bool = Fal
     that help little ask for a larger weight.
     """
     if is_reduced:
-        meet_joints(s)
+        reduced.meet_joints(s)
     else:
         put_velocities(s, s.v)
     left, weight, s.factored = residual_of(s, s.v, 0.0), WEIGHT, 0.0
     most = MOST_WEIGHT if is_reduced else WEIGHT
     if is_reduced and left > tolerance:
         weight = ALONE_WEIGHT
-        put_felt(s, 1)
+        reduced.put_felt(s, 1)
     for _ in range(ROUNDS):
         if left <= tolerance:
             break
         inner = INNER * max(0.1 * tolerance, min(left, 1e-3))
         if is_reduced:
-            weight = reduced_round(s, weight, inner)
+            weight = reduced.reduced_round(s, weight, inner)
         else:
             solve_round(s, weight, inner)
             exchange(s)
@@ -326,15 +315,15 @@ def newton(s: StepArrays, tolerance: float, is_reduced: bool, raises: bool = Fal
         if helps and is_reduced:
             weight = most
         elif helps or (raises and new < WORSE * left and weight < MOST_WEIGHT):
-            weight = min(weight / LESS, max(most, weight) if helps else MOST_WEIGHT)
+            weight = min(weight / reduced.LESS, max(most, weight) if helps else MOST_WEIGHT)
         else:
-            weight *= LESS
+            weight *= reduced.LESS
         if new >= (WORSE if raises else 1.0) * left:
             exchange(s)
             put_velocities(s, s.v)
         else:
             left = new
-        if weight < LEAST or (left <= SETTLED and not helps and not is_reduced):
+        if weight < reduced.LEAST or (left <= SETTLED and not helps and not is_reduced):
             break
     return left
 

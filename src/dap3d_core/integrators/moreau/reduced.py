@@ -12,29 +12,10 @@ three unknowns a contact.
 import math
 
 from dap3d_core.assembly.evaluate import copy, zero
+from dap3d_core.integrators.moreau import matrix, newton
 from dap3d_core.integrators.moreau.arrays import ALONE, CONE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import put_speeds
 from dap3d_core.integrators.moreau.impulses import STICKS, mode_of
-from dap3d_core.integrators.moreau.matrix import (
-    assemble,
-    factor,
-    factor_square,
-    lay_out,
-    solve_factored,
-    solve_square,
-)
-from dap3d_core.integrators.moreau.newton import (
-    CUTS,
-    SOLUTION_ROUNDING,
-    TINY,
-    add_pull,
-    bound_of,
-    clear,
-    put_projected,
-    put_slopes,
-    put_velocities,
-    speed_of,
-)
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -56,10 +37,10 @@ def factor_joints(s: StepArrays) -> bool:
         s.held_count = m
         return False
     s.chosen_count = 0  # the matrix is of joints alone
-    has_room = lay_out(s, 0)
+    has_room = matrix.lay_out(s, 0)
     if has_room:
-        assemble(s, STIFF, 0.0)
-        factor(s)
+        matrix.assemble(s, STIFF, 0.0)
+        matrix.factor(s)
     s.chosen_count = m
     return has_room
 
@@ -84,17 +65,17 @@ def put_felt(s: StepArrays, passes: int) -> None:
             if is_idle(s, c, r):
                 continue
             for turn in range(passes):
-                clear(s, s.delta)
+                newton.clear(s, s.delta)
                 for side in range(2):
                     row = s.delta[s.bodies[c, side]]
                     for k in range(6):
                         row[k] = s.J[c, 12 * r + 6 * side + k]
                 if turn > 0:
-                    add_pull(s, s.lead, s.delta)
+                    newton.add_pull(s, s.lead, s.delta)
                 solve_bodies(s)
                 for n in range(s.row_count):
                     k = s.rows[n]
-                    s.pull[k] = speed_of(s, k, s.delta)
+                    s.pull[k] = newton.speed_of(s, k, s.delta)
                     s.lead[k] -= STIFF * s.s[k] * s.pull[k]
             for n in range(s.row_count):
                 s.answer[s.rows[n], column] = s.lead[s.rows[n]]
@@ -128,7 +109,7 @@ def solve_bodies(s: StepArrays) -> None:
     for q in range(s.used_count):
         for k in range(6):
             s.change[6 * q + k] = s.delta[s.used[q], k]
-    solve_factored(s)
+    matrix.solve_factored(s)
     zero(s.delta[0])
     for q in range(s.used_count):
         for k in range(6):
@@ -138,21 +119,21 @@ def solve_bodies(s: StepArrays) -> None:
 @compiled
 def meet_joints(s: StepArrays) -> None:
     """Improve the impulses y of joints, given those of contacts, and put velocities with both."""
-    put_velocities(s, s.v)
+    newton.put_velocities(s, s.v)
     left = largest = 0.0
     for n in range(s.row_count):
         k = s.rows[n]
-        missed = s.s[k] * (speed_of(s, k, s.v) - s.free_speed[k])
+        missed = s.s[k] * (newton.speed_of(s, k, s.v) - s.free_speed[k])
         left, largest = max(left, abs(missed)), max(largest, abs(s.y[k]))
         s.lead[k] = -STIFF * missed
-    if left <= SOLUTION_ROUNDING * largest:  # it would be of rounding alone
+    if left <= newton.SOLUTION_ROUNDING * largest:  # it would be of rounding alone
         return
-    clear(s, s.delta)
-    add_pull(s, s.lead, s.delta)
+    newton.clear(s, s.delta)
+    newton.add_pull(s, s.lead, s.delta)
     solve_bodies(s)
     for n in range(s.row_count):
         k = s.rows[n]
-        s.y[k] += s.lead[k] - STIFF * s.s[k] * speed_of(s, k, s.delta)
+        s.y[k] += s.lead[k] - STIFF * s.s[k] * newton.speed_of(s, k, s.delta)
     for q in range(s.used_count):
         for k in range(6):
             s.v[s.used[q], k] += s.delta[s.used[q], k]
@@ -223,13 +204,13 @@ def solve_reduced(s: StepArrays, weight: float, tolerance: float) -> bool:
 @compiled
 def aim_of(s: StepArrays, tolerance: float) -> float:
     """The merit at which a round is solved."""
-    size = TINY
+    size = newton.TINY
     for q in range(s.chosen_count):
         c = s.chosen[q]
         for k in range(3):
             x = s.x[c, k] + s.push[c, k]
             size += x * x / s.r[c]
-    return max(tolerance, SOLUTION_ROUNDING) ** 2 * size
+    return max(tolerance, newton.SOLUTION_ROUNDING) ** 2 * size
 
 
 @compiled
@@ -248,8 +229,8 @@ def put_missing(s: StepArrays, change: Floats, weight: float) -> float:
                 d = change[s.chosen[q]]
                 u += row[3 * q] * d[0] + row[3 * q + 1] * d[1] + row[3 * q + 2] * d[2]
             z[r] = x[r] - part * u
-        s.rim[c] = bound_of(s, c, s.z, s.y)
-        put_projected(z, s.rim[c], s.kind[c], missing)
+        s.rim[c] = newton.bound_of(s, c, s.z, s.y)
+        newton.put_projected(z, s.rim[c], s.kind[c], missing)
         for r in range(3):
             missing[r] = change[c, r] - (missing[r] - x[r])
             total += missing[r] * missing[r] / s.r[c]
@@ -269,7 +250,7 @@ def try_reduced(s: StepArrays, weight: float, merit: float, feels: float, holds:
     for q in range(m):
         c = s.chosen[q]
         B, z, part = s.B[c], s.z[c], weight * s.r[c]
-        put_slopes(z, feels * s.mu[c], s.rim[c], s.kind[c], B)
+        newton.put_slopes(z, feels * s.mu[c], s.rim[c], s.kind[c], B)
         if holds and s.kind[c] == CONE and s.x[c, 0] > PUSHES * largest:
             hold(s, c)
         for r in range(3):
@@ -290,10 +271,10 @@ def try_reduced(s: StepArrays, weight: float, merit: float, feels: float, holds:
                 along = weight * s.r[u] * z[r] / size
                 for k in range(n):
                     K[n * (3 * q + r) + k] += along * s.felt[first, k]
-    factor_square(K, s.exchanged, n)
-    solve_square(K, s.exchanged, step, n)
+    matrix.factor_square(K, s.exchanged, n)
+    matrix.solve_square(K, s.exchanged, step, n)
     part = 1.0
-    for _ in range(1 if holds else CUTS):
+    for _ in range(1 if holds else newton.CUTS):
         for q in range(m):
             c = s.chosen[q]
             for k in range(3):
@@ -316,7 +297,7 @@ def hold(s: StepArrays, c: int) -> None:
     held[0], held[1], held[2] = x[0], z[1], z[2]
     if mode_of(s, c) == STICKS:
         rim = size
-    put_slopes(held, s.mu[c], rim, CONE, s.B[c])
+    newton.put_slopes(held, s.mu[c], rim, CONE, s.B[c])
     part = s.mu[c] * z[0] / size if rim < size else 1.0
     missing[0] = x[0] - z[0]
     missing[1], missing[2] = x[1] - part * z[1], x[2] - part * z[2]

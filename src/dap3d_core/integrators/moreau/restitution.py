@@ -16,14 +16,7 @@ from dap3d_core.integrators.moreau.arrays import BOUNCES, CONE, STOPS, StepArray
 from dap3d_core.integrators.moreau.contact_set import velocity_of
 from dap3d_core.integrators.moreau.gauss_seidel import copy_impulses
 from dap3d_core.integrators.moreau.newton import TINY, product_of
-from dap3d_core.integrators.moreau.problem import (
-    BODY,
-    CONTACT,
-    ROW,
-    find_groups,
-    root_of,
-    solve,
-)
+from dap3d_core.integrators.moreau.problem import BODY, CONTACT, ROW, find_groups, root_of, solve
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
 

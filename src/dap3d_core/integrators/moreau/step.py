@@ -8,49 +8,10 @@ from typing import Any
 
 from dap3d_core.assembly.arrays import System, coordinate_offset
 from dap3d_core.assembly.evaluate import copy, zero
+from dap3d_core.integrators.moreau import contact_set, free_motion, impulses, restitution
 from dap3d_core.integrators.moreau.arrays import CONE, STAYS, WHOLE, StepArrays
-from dap3d_core.integrators.moreau.contact_set import (
-    evaluate_rows,
-    find_contacts,
-    find_grips,
-    misfit_of,
-    put_resistances,
-    turn_rows,
-    velocity_of,
-)
-from dap3d_core.integrators.moreau.free_motion import (
-    fit_joints,
-    follow_states,
-    give_velocities,
-    largest_rate,
-    move,
-    move_freely,
-    normalise,
-    take_velocities,
-)
-from dap3d_core.integrators.moreau.impulses import (
-    forget,
-    keep_for_reports,
-    let_slip,
-    log_contacts,
-    order_memory,
-    put_means,
-    recall,
-    remember,
-    slot_of,
-)
 from dap3d_core.integrators.moreau.newton import product_of, speed_of
 from dap3d_core.integrators.moreau.problem import NEAR, prepare_problem, solve
-from dap3d_core.integrators.moreau.restitution import (
-    NOT_HIT,
-    OVERLAP,
-    limit_bounces,
-    mark_moved,
-    mean_of,
-    put_bias,
-    put_falls,
-    put_flies,
-)
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration_state import Function
 from dap3d_core.integrators.stepping.output import may_step, project_state
@@ -147,13 +108,13 @@ def fly(work: Any, s: StepArrays, rhs: Function, system: System, loops: Any) -> 
         work.rate = work.last_rate = 0.0
         for array in (work.direction, work.pulls):
             zero(array)
-        forget(work.memory, 0)
+        impulses.forget(work.memory, 0)
     renews = work.step_count % RENEWED == 0
     if renews:
-        work.rate = largest_rate(work, s, rhs, system, loops)
+        work.rate = free_motion.largest_rate(work, s, rhs, system, loops)
     s.t1 = next_end(work)
     s.h = s.t1 - work.t
-    move_freely(work, s, renews, rhs, system, loops)
+    free_motion.move_freely(work, s, renews, rhs, system, loops)
 
 
 @compiled
@@ -179,9 +140,9 @@ def goes_on(
     first = work.row_count
     again = may_step(work, state_at, limit, functions[1], functions[2], system, loops)
     for q in range(first, work.row_count):
-        put_means(work, s, work.rows[q])
+        impulses.put_means(work, s, work.rows[q])
         if s.is_exported == 0:
-            log_contacts(work, s, work.rows[q, 0])
+            impulses.log_contacts(work, s, work.rows[q, 0])
     return again
 
 
@@ -195,13 +156,13 @@ def state_at(work: Any, t: float, y: Floats) -> None:
 def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     """Find impulses of contacts, and velocities ``end`` behind them; False without room."""
     y, trial, n = work.state[at.Y], work.state[at.TRIAL], s.mass.size - 1
-    take_velocities(y, n, s.before)
-    take_velocities(trial, n, s.free)
+    free_motion.take_velocities(y, n, s.before)
+    free_motion.take_velocities(trial, n, s.free)
     for b in range(1, n + 1 if work.pushed[0, 0] != 0.0 else 1):
         for k in range(6):
             s.free[b, k] -= s.h * work.pushed[b, k]
     put_margins(s)
-    if not find_contacts(work.t, y, FAR_APART, s, system, loops):
+    if not contact_set.find_contacts(work.t, y, FAR_APART, s, system, loops):
         return False
     if work.step_count == 0:
         work.overlap_at_start = deepest_of(s)
@@ -215,29 +176,29 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         for b in range(n + 1):
             copy(s.end[b], s.free[b])
         return True
-    any_collides = put_bias(s)
-    if s.declared_law.size > 0 and not find_grips(work.t, s, system, loops):
+    any_collides = restitution.put_bias(s)
+    if s.declared_law.size > 0 and not contact_set.find_grips(work.t, s, system, loops):
         work.t_stop, work.status, s.stage = work.t, at.DRIVEN, 0
         return False
-    order_memory(work.memory, s.slots)
+    impulses.order_memory(work.memory, s.slots)
     turns = stay_closed(work, s)
     if turns:
-        if not turn_rows(work.t + 0.5 * s.h, put_middle(work, s), s, system, loops):
+        if not contact_set.turn_rows(work.t + 0.5 * s.h, put_middle(work, s), s, system, loops):
             return False
     elif s.declared_gap.size == 0 and s.y.size > 0:
-        evaluate_rows(work.t, y, False, s, system, loops)
+        contact_set.evaluate_rows(work.t, y, False, s, system, loops)
     for c in range(s.touch_count if s.resistance_count > 0 else 0):
-        put_resistances(c, s)
+        contact_set.put_resistances(c, s)
     if not solve_fitted(work, s, turns, system, loops):
         return False
     if any_collides:
-        put_flies(s)
-        if not limit_bounces(s, work.rtol):
+        restitution.put_flies(s)
+        if not restitution.limit_bounces(s, work.rtol):
             return False
     s.is_solved = 1
     work.largest_residual = max(work.largest_residual, s.residual)
-    remember(work, s)
-    keep_for_reports(s)
+    impulses.remember(work, s)
+    impulses.keep_for_reports(s)
     for b in range(n + 1):
         copy(s.end[b], s.v[b])
     return True
@@ -249,35 +210,35 @@ def solve_fitted(work: Any, s: StepArrays, turns: bool, system: System, loops: A
     for k in range(s.y.size):
         s.free_speed[k] = speed_of(s, k, s.free)
     left = FITS if s.y.size > 0 else 0
-    recall(work, s)
+    impulses.recall(work, s)
     while True:
         prepare_problem(s)
         if not solve(s, work.rtol):
             return False
-        if not let_slip(s):
+        if not impulses.let_slip(s):
             if s.residual <= work.rtol or left == 0:
                 return True
             left -= 1
-            fit_joints(work, s, turns, system, loops)
-            recall(work, s)
+            free_motion.fit_joints(work, s, turns, system, loops)
+            impulses.recall(work, s)
 
 
 @compiled
 def carry_on(work: Any, s: StepArrays) -> None:
     """Move the bodies that contacts or joints act on as they do, as the trial state."""
     y, trial, h, goes = work.state[at.Y], work.state[at.TRIAL], s.h, s.queue
-    put_falls(s)
-    mark_moved(work, s, goes)
+    restitution.put_falls(s)
+    restitution.mark_moved(work, s, goes)
     for b in range(1, s.end.shape[0]):
         c, d = coordinate_offset(b), s.trial[b]
         for k in range(6):
-            d[k] = mean_of(s, b, k)
+            d[k] = restitution.mean_of(s, b, k)
         if goes[s.machine[b]] == 0:
             copy(d, s.path[b])
             continue
         for k in range(7):
             trial[c + k] = y[c + k]
-        move(trial, c, h * d[0], h * d[1], h * d[2], h * d[3], h * d[4], h * d[5])
+        free_motion.move(trial, c, h * d[0], h * d[1], h * d[2], h * d[3], h * d[4], h * d[5])
     trial[trial.size - 1] += work_done(work, s)
     keep_pushed(work, s)
 
@@ -288,9 +249,9 @@ def keep_pushed(work: Any, s: StepArrays) -> None:
     s.is_steady = 1 if work.pushed[0, 0] != 0.0 else 0
     work.pushed[0, 0] = 0.0
     for b in range(1, s.end.shape[0]):
-        s.is_steady = 0 if s.hit[b] != NOT_HIT else s.is_steady
+        s.is_steady = 0 if s.hit[b] != restitution.NOT_HIT else s.is_steady
         for k in range(6):
-            change = s.end[b, k] - s.free[b, k] if s.hit[b] == NOT_HIT else 0.0
+            change = s.end[b, k] - s.free[b, k] if s.hit[b] == restitution.NOT_HIT else 0.0
             work.pushed[b, k] = change / s.h
             if change != 0.0:
                 work.pushed[0, 0] = 1.0
@@ -338,10 +299,10 @@ def stay_closed(work: Any, s: StepArrays) -> bool:
         i, j = s.bodies[c, 0], s.bodies[c, 1]
         if s.kind[c] != CONE or s.collides[c] != 0:
             continue
-        if s.slots[slot_of(work.memory, s.slots, s.key[c])] < 0:
+        if s.slots[impulses.slot_of(work.memory, s.slots, s.key[c])] < 0:
             continue
         moved = s.queue[i] + s.queue[j] > 0 and abs(s.gap[c]) <= MOVED_BY_JOINTS * s.length
-        if moved and s.hit[max(i, j)] == NOT_HIT:
+        if moved and s.hit[max(i, j)] == restitution.NOT_HIT:
             s.bias[c, 0] = s.gap[c] / s.h
         way = s.h * (speed_at(s, i) + speed_at(s, j))
         if way > least and (is_pushed(work, i) or is_pushed(work, j)):
@@ -355,7 +316,7 @@ def mark_moved_apart(s: StepArrays) -> None:
     for b in range(s.queue.size):
         s.queue[b] = 0
     for c in range(s.law_count):
-        if s.kind[c] == CONE and OVERLAP < s.gap[c] / s.length <= MOVED_BY_JOINTS:
+        if s.kind[c] == CONE and restitution.OVERLAP < s.gap[c] / s.length <= MOVED_BY_JOINTS:
             s.queue[s.bodies[c, 0]] = s.queue[s.bodies[c, 1]] = 1
     s.queue[0] = 0
 
@@ -383,7 +344,7 @@ def put_middle(work: Any, s: StepArrays) -> Floats:
     for i in range(size):
         middle[i] = 0.5 * (y[i] + trial[i])
     for b in range(1, s.end.shape[0]):
-        normalise(middle, coordinate_offset(b) + 3)
+        free_motion.normalise(middle, coordinate_offset(b) + 3)
     return middle
 
 
@@ -404,16 +365,16 @@ def work_done(work: Any, s: StepArrays) -> float:
             before, end = s.before[b, k], s.end[b, k]
             free = s.free[b, k] + s.h * work.pushed[b, k]
             forced[k], way[k] = s.free[b, k] - before, mean[k] - s.path[b, k]
-            rest[k] = (end if first == NOT_HIT else before) - free
+            rest[k] = (end if first == restitution.NOT_HIT else before) - free
             curve[k] = 0.5 * (before + free) - s.path[b, k]
             mean[k] = 0.5 * (before + end)
-            if first != NOT_HIT:
+            if first != restitution.NOT_HIT:
                 mean[k] += (first - 0.5) * forced[k]
         total += product_of(forced, way, m, spin) + product_of(rest, curve, m, spin)
-        if first != NOT_HIT:
+        if first != restitution.NOT_HIT:
             given += (first - 0.5) * (1.0 - s.flies[b]) * product_of(forced, forced, m, spin)
     for c in range(s.contact_count):
-        u0, u1, u2 = velocity_of(s, c, s.trial)
+        u0, u1, u2 = contact_set.velocity_of(s, c, s.trial)
         pushed, rubbed = s.x[c, 0] * u0, s.x[c, 1] * u1 + s.x[c, 2] * u2
         if s.kind[c] == WHOLE:
             pushed, rubbed = 0.0, rubbed + pushed
@@ -440,13 +401,13 @@ def part(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     for turn in range(PASSES):
         if not all_finite(trial):  # ``finish`` says so
             break
-        if not find_contacts(s.t1, trial, 2.0 * margin, s, system, loops):
+        if not contact_set.find_contacts(s.t1, trial, 2.0 * margin, s, system, loops):
             return False
         deepest = deepest_of(s)
         if s.contact_count > 0 and s.declared_gap.size == 0 and s.y.size > 0:
-            evaluate_rows(s.t1, trial, True, s, system, loops)
-        enough = (MOVED_BY_JOINTS if turn > 0 and s.y.size > 0 else OVERLAP) * s.length
-        if max(deepest, misfit_of(s, system)) <= enough:
+            contact_set.evaluate_rows(s.t1, trial, True, s, system, loops)
+        enough = (MOVED_BY_JOINTS if turn > 0 and s.y.size > 0 else restitution.OVERLAP) * s.length
+        if max(deepest, contact_set.misfit_of(s, system)) <= enough:
             break
         prepare_problem(s)
         for b in range(s.free.shape[0]):
@@ -462,8 +423,8 @@ def part(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         for b in range(1, s.v.shape[0]):
             v = s.v[b]
             way = max(way, length_of(v, 0) + s.length * length_of(v, 3))
-            move(trial, coordinate_offset(b), v[0], v[1], v[2], v[3], v[4], v[5])
-        if way * (s.residual + BENDS * way / s.length) <= OVERLAP * s.length:
+            free_motion.move(trial, coordinate_offset(b), v[0], v[1], v[2], v[3], v[4], v[5])
+        if way * (s.residual + BENDS * way / s.length) <= restitution.OVERLAP * s.length:
             deepest = 0.0  # to that
             break
     work.deepest = max(work.deepest, deepest)
@@ -475,9 +436,9 @@ def finish(work: Any, s: StepArrays, functions: Any, system: System, loops: Any)
     """Make the trial state that of the end of the step."""
     y, trial = work.state[at.Y], work.state[at.TRIAL]
     if s.is_solved != 0 and s.is_steady == 0 and s.first_state < y.size:
-        follow_states(work, s, functions[0], system, loops)
+        free_motion.follow_states(work, s, functions[0], system, loops)
     if s.is_solved != 0:
-        give_velocities(trial, s.end)
+        free_motion.give_velocities(trial, s.end)
     work.segment_step += 1 if s.t1 >= end_of_step(work) else 0
     copy(work.state[at.OTHER], y)
     copy(y, trial)

@@ -15,13 +15,7 @@ what the error of steps with more stages is held to (integration.py).
 from dap3d_core.assembly.arrays import VALUE, Floats, states_offset, velocity_offset
 from dap3d_core.assembly.evaluate import call_kinds, copy, place_state, rates, zero
 from dap3d_core.assembly.metric import scaled
-from dap3d_core.formulations.common.constraints import (
-    PART,
-    acceleration_residual,
-    correct,
-    factorise,
-    linearise,
-)
+from dap3d_core.formulations.common import constraints
 from dap3d_core.integrators.radau.newton import method_index
 from dap3d_core.integrators.radau.state import OLD, OLD_SLOPE, SLOPE, TRIAL_SLOPE, Given, RadauState
 from dap3d_core.integrators.radau.tableau import FEWEST
@@ -49,11 +43,11 @@ def find_slope(t: float, h: float, work: RadauState, given: Given) -> float:
     place_state(y, system)
     if system.row.shape[0] > 0:
         call_kinds(VALUE, VALUE, t1, system, loops, force, force, force)
-        linearise(t1, system, loops)
+        constraints.linearise(t1, system, loops)
         scale_slopes(inverse, h, work, metric, system.acceleration)
-        acceleration_residual(system)
-        factorise(system, PART)
-        correct(system)
+        constraints.acceleration_residual(system)
+        constraints.factorise(system, constraints.PART)
+        constraints.correct(system)
     else:
         zero(system.change)
     rates(y, metric, system.change, out)

@@ -13,14 +13,8 @@ from dap3d_core.integrators.radau.newton import (
     solve_first,
 )
 from dap3d_core.integrators.radau.state import Given, RadauState
+from dap3d_core.integrators.stepping import rounding
 from dap3d_core.integrators.stepping.integration_state import NOISE, SCRATCH, TRIAL, Function, Y
-from dap3d_core.integrators.stepping.rounding import (
-    ROUNDINGS,
-    SAMPLES,
-    change_digits,
-    find_rate_noise,
-    judge_noise,
-)
 from dap3d_core.integrators.stepping.vector_ops import scaled_largest
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
@@ -108,15 +102,15 @@ def measure_noise(
     now, changed = work.last_multipliers[work.last_stages - 1], work.multipliers[0]
     e, size = work.method.e[method_index(work.stages)], 0.0
     for i in range(work.stages):
-        size += ROUNDINGS * abs(e[i]) / h
+        size += rounding.ROUNDINGS * abs(e[i]) / h
     zero(noise)
     zero(now[0])
     zero(changed[0])
-    work.rhs_count += SAMPLES + 1
+    work.rhs_count += rounding.SAMPLES + 1
     evaluate(t, y, now, 1, work.R[1], work, given)
-    for sample in range(SAMPLES):
-        change_digits(y, sample, argument)
-        change_digits(now[1], sample, changed[1])
+    for sample in range(rounding.SAMPLES):
+        rounding.change_digits(y, sample, argument)
+        rounding.change_digits(now[1], sample, changed[1])
         evaluate(t, argument, changed, 0, work.R[0], work, given)
         for k in range(y.shape[0]):
             work.R[0, k] -= work.R[1, k]
@@ -136,8 +130,8 @@ def bound_stage_noise(h: float, work: RadauState, rhs: Function, system: Any, lo
     Near a singular pose the factors of a step make more of rounding than there is of it.
     """
     noise, own = work.tolerance[NOISE], work.R[0]
-    work.rhs_count += SAMPLES + 1
-    find_rate_noise(work, own, rhs, system, loops)
+    work.rhs_count += rounding.SAMPLES + 1
+    rounding.find_rate_noise(work, own, rhs, system, loops)
     for k in range(noise.shape[0]):
         noise[k] = min(noise[k], own[k])
-    judge_noise(work, h)
+    rounding.judge_noise(work, h)

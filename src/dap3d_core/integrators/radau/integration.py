@@ -11,10 +11,7 @@ from dap3d_core.assembly.arrays import System
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.stabilized_index2.jacobian import BODY, FIRST_ROW, Tangent
 from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
-from dap3d_core.formulations.stabilized_index2.state_tangent import (
-    OF_LOOPS,
-    make_tangent,
-)
+from dap3d_core.formulations.stabilized_index2.state_tangent import OF_LOOPS, make_tangent
 from dap3d_core.integrators.radau import state as at
 from dap3d_core.integrators.radau.dense_output import dense_state, find_slope
 from dap3d_core.integrators.radau.error import estimate_error, find_work, measure_stage_noise

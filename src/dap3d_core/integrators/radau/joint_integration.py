@@ -17,28 +17,15 @@ import numpy as np
 from dap3d_core.assembly.arrays import LENGTH, STEP, Floats, System
 from dap3d_core.assembly.evaluate import copy
 from dap3d_core.formulations.stabilized_index2.jacobian import BENT, MAY_BEND
+from dap3d_core.integrators.radau import newton
 from dap3d_core.integrators.radau.convergence import size_of_change
 from dap3d_core.integrators.radau.error import filter_error, measure_noise, sum_work
 from dap3d_core.integrators.radau.integration import RadauIntegration
-from dap3d_core.integrators.radau.newton import (
-    evaluate_stages,
-    factorise,
-    find_slopes,
-    iterate_stages,
-    method_index,
-    pair_count,
-    separate,
-    unite,
-)
 from dap3d_core.integrators.radau.state import TRIAL_SLOPE, Given, RadauState
 from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.integration_state import OTHER, SCRATCH, TRIAL, Y
 from dap3d_core.kernels.compiler.types import Table
-from dap3d_core.kernels.runtime.array_struct import (
-    Arrays,
-    IntegerMatrix,
-    Matrix,
-)
+from dap3d_core.kernels.runtime.array_struct import Arrays, IntegerMatrix, Matrix
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.kernels.scalar_math import is_differentiated
 from dap3d_core.linear.lu import StateNode, make_lu_plan, solve_lu
@@ -149,7 +136,7 @@ def fill_dense(s: Any, K: Any, given: Given) -> None:
 @compiled
 def factorise_rates(t: float, h: float, work: RadauState, given: Given) -> float:
     """As ``factorise_both``."""
-    return factorise(h, work, given, given[2], fill_dense)
+    return newton.factorise(h, work, given, given[2], fill_dense)
 
 
 @compiled
@@ -166,12 +153,12 @@ def evaluate_rate(
 def solve_rates(h: float, work: RadauState, given: Given) -> None:
     """R from the residuals of the stages to the changes; that of the work is none."""
     tangent = given[2]
-    stages, m = work.stages, method_index(work.stages)
-    separate(work.method.T_inverse[m], stages, work.R, work.xr, work.xc)
+    stages, m = work.stages, newton.method_index(work.stages)
+    newton.separate(work.method.T_inverse[m], stages, work.R, work.xr, work.xc)
     solve_lu(tangent.nodes, tangent.columns, work.K, work.pivots, work.xr)
-    for p in range(pair_count(stages)):
+    for p in range(newton.pair_count(stages)):
         solve_lu(tangent.nodes, tangent.columns, work.Kc[p], work.pivotsc[p], work.xc[p])
-    unite(work.method.T[m], stages, work.xr, work.xc, work.R)
+    newton.unite(work.method.T[m], stages, work.xr, work.xc, work.R)
     for i in range(stages):
         work.R[i, work.R.shape[1] - 1] = 0.0
 
@@ -192,9 +179,9 @@ def change_rates(h: float, work: RadauState, system: System) -> float:
 @compiled
 def find_rate_stages(t: float, h: float, work: RadauState, given: Given) -> float:
     """As ``find_stages``."""
-    shorter = iterate_stages(t, h, work, given, evaluate_rate, solve_rates, change_rates)
+    shorter = newton.iterate_stages(t, h, work, given, evaluate_rate, solve_rates, change_rates)
     if shorter == 0.0 and is_differentiated():
-        find_slopes(t, h, work, given, evaluate_rate, solve_rates)
+        newton.find_slopes(t, h, work, given, evaluate_rate, solve_rates)
     return shorter
 
 
@@ -234,7 +221,7 @@ def measure_rate_noise(t: float, h: float, work: RadauState, given: Given) -> fl
 @compiled
 def find_rate_work(t: float, h: float, work: RadauState, given: Given) -> float:
     """As ``find_work``."""
-    evaluate_stages(t, h, work, given, evaluate_rate)
+    newton.evaluate_stages(t, h, work, given, evaluate_rate)
     sum_work(h, work)
     return 0.0
 

@@ -14,31 +14,10 @@ from dap3d_core.assembly.arrays import Floats, System, velocity_offset
 from dap3d_core.assembly.evaluate import copy, largest, place, zero
 from dap3d_core.assembly.state_update import add_displacement, add_velocity
 from dap3d_core.formulations.common.constraints import linearise
+from dap3d_core.formulations.stabilized_index2 import stage_equations
 from dap3d_core.formulations.stabilized_index2.jacobian import BENT, differentiate
-from dap3d_core.formulations.stabilized_index2.stage_equations import (
-    add_transposed,
-    couple_length,
-    evaluate_stage,
-    fill_matrix,
-    find_length,
-    keep_frames,
-    keep_state,
-    scale_residual,
-    unscale_solution,
-)
 from dap3d_core.formulations.stabilized_index2.state_tangent import differentiate_states
-from dap3d_core.integrators.radau.convergence import (
-    MOST_OF_SLOPES,
-    SLOWEST,
-    WORTH,
-    change_of_slopes,
-    converges,
-    is_at_rounding,
-    is_exact,
-    is_settling,
-    is_stalled,
-    size_of_change,
-)
+from dap3d_core.integrators.radau import convergence
 from dap3d_core.integrators.radau.state import SLOPE, Given, RadauState
 from dap3d_core.integrators.radau.tableau import FEWEST
 from dap3d_core.integrators.stepping.integration_state import SCRATCH, Y
@@ -79,7 +58,7 @@ def find_tangent(work: RadauState, given: Given) -> None:
     at = work.t + work.tangent_step if work.has_last_step != 0 else work.t
     place(at, argument, system, loops)
     linearise(at, system, loops)
-    keep_state(system, matrix, work.regularisation)
+    stage_equations.keep_state(system, matrix, work.regularisation)
     for k in range(system.multipliers.shape[0]):
         system.multipliers[k] = -work.multipliers[work.stages - 1, 1, k]
     work.jacobian_count += 1
@@ -121,7 +100,7 @@ def factorise_both(t: float, h: float, work: RadauState, given: Given) -> float:
 def fill_stages(s: Any, K: Any, given: Given) -> None:
     """K = s - J, for real or complex s in 1/s."""
     system, _loops, tangent, matrix = given
-    fill_matrix(s, K, system.blocks, matrix, tangent)
+    stage_equations.fill_matrix(s, K, system.blocks, matrix, tangent)
 
 
 @compiled_into
@@ -205,11 +184,11 @@ def solve_first(h: float, work: RadauState, given: Given) -> None:
     system, _loops, _tangent, matrix = given
     x, along = work.x[0], work.along[0]
     s = work.method.poles[method_index(work.stages), 0] / h
-    scale_residual(work.R[0], work.G[0], system, matrix, work.frames[0], x, along)
-    couple_length(s, x, along, matrix)
+    stage_equations.scale_residual(work.R[0], work.G[0], system, matrix, work.frames[0], x, along)
+    stage_equations.couple_length(s, x, along, matrix)
     solve_lu(matrix.nodes, matrix.columns, work.K, work.pivots, x)
-    find_length(s, x, along, matrix)
-    unscale_solution(x, along, system, matrix, work.frames[0], work.R[0], work.G[0])
+    stage_equations.find_length(s, x, along, matrix)
+    stage_equations.unscale_solution(x, along, system, matrix, work.frames[0], work.R[0], work.G[0])
 
 
 @compiled
@@ -247,22 +226,26 @@ def solve_stages(h: float, work: RadauState, given: Given) -> None:
     x, along, stages, m = work.x, work.along, work.stages, method_index(work.stages)
     poles, T, inverse = work.method.poles[m], work.method.T[m], work.method.T_inverse[m]
     for i in range(stages):
-        scale_residual(work.R[i], work.G[i], system, matrix, work.frames[i], x[i], along[i])
+        stage_equations.scale_residual(
+            work.R[i], work.G[i], system, matrix, work.frames[i], x[i], along[i]
+        )
     separate(inverse, stages, x, work.xr, work.xc)
     separate(inverse, stages, along, work.alongr, work.alongc)
     s = poles[0] / h
-    couple_length(s, work.xr, work.alongr, matrix)
+    stage_equations.couple_length(s, work.xr, work.alongr, matrix)
     solve_lu(matrix.nodes, matrix.columns, work.K, work.pivots, work.xr)
-    find_length(s, work.xr, work.alongr, matrix)
+    stage_equations.find_length(s, work.xr, work.alongr, matrix)
     for p in range(pair_count(stages)):
         sc = pole(poles, p, h)
-        couple_length(sc, work.xc[p], work.alongc[p], matrix)
+        stage_equations.couple_length(sc, work.xc[p], work.alongc[p], matrix)
         solve_lu(matrix.nodes, matrix.columns, work.Kc[p], work.pivotsc[p], work.xc[p])
-        find_length(sc, work.xc[p], work.alongc[p], matrix)
+        stage_equations.find_length(sc, work.xc[p], work.alongc[p], matrix)
     unite(T, stages, work.xr, work.xc, x)
     unite(T, stages, work.alongr, work.alongc, along)
     for i in range(stages):
-        unscale_solution(x[i], along[i], system, matrix, work.frames[i], work.R[i], work.G[i])
+        stage_equations.unscale_solution(
+            x[i], along[i], system, matrix, work.frames[i], work.R[i], work.G[i]
+        )
 
 
 @compiled
@@ -284,8 +267,8 @@ def evaluate_bodies(
 ) -> None:
     """Rates at a state with multipliers (2, R) into out; G[i] and ``frames[i]`` there."""
     system, loops, _tangent, matrix = given
-    evaluate_stage(t, y, multipliers, matrix.held, out, work.G[i], system, loops)
-    keep_frames(system.body, work.frames[i])
+    stage_equations.evaluate_stage(t, y, multipliers, matrix.held, out, work.G[i], system, loops)
+    stage_equations.keep_frames(system.body, work.frames[i])
 
 
 @compiled_into
@@ -311,12 +294,12 @@ def size_of_multipliers(h: float, change: Floats, work: RadauState, system: Syst
     moved, n = system.change, system.metric.shape[0] - 1
     zero(out)
     zero(moved)
-    add_transposed(system.blocks, system.D, change[0], h, moved)
+    stage_equations.add_transposed(system.blocks, system.D, change[0], h, moved)
     add_displacement(y, system.metric, moved, out)
     zero(moved)
-    add_transposed(system.blocks, system.D, change[1], h, moved)
+    stage_equations.add_transposed(system.blocks, system.D, change[1], h, moved)
     add_velocity(system.metric, moved, out[velocity_offset(1, n) :])
-    return size_of_change(out, h, work)
+    return convergence.size_of_change(out, h, work)
 
 
 @compiled
@@ -329,7 +312,7 @@ def change_stages(h: float, work: RadauState, system: System) -> float:
     y = work.state[Y]
     work.state_change = work.multiplier_change = 0.0
     for i in range(work.stages):
-        size = size_of_change(work.R[i], h, work)
+        size = convergence.size_of_change(work.R[i], h, work)
         other = size_of_multipliers(h, work.G[i], work, system)
         if not size <= work.state_change:
             work.state_change = size
@@ -372,18 +355,20 @@ def find_slopes(
     """
     stages, moves, found, changes = work.Z, work.R, work.multipliers, work.G
     before = LARGEST
-    for done in range(MOST_OF_SLOPES):
+    for done in range(convergence.MOST_OF_SLOPES):
         evaluate_stages(t, h, work, given, evaluate)
         solve(h, work, given)
         work.rhs_count -= work.stages
-        change = change_of_slopes(work)
+        change = convergence.change_of_slopes(work)
         for i in range(work.stages):
             for k in range(stages.shape[1]):
                 stages[i, k] = with_slopes(stages[i, k], stages[i, k] + moves[i, k])
             for r in range(2):
                 for k in range(found.shape[2]):
                     found[i, r, k] = with_slopes(found[i, r, k], found[i, r, k] + changes[i, r, k])
-        if change <= work.newton_limit * work.rtol or (done > 0 and not change < WORTH * before):
+        if change <= work.newton_limit * work.rtol or (
+            done > 0 and not change < convergence.WORTH * before
+        ):
             return
         before = change
 
@@ -414,23 +399,23 @@ def iterate_stages(
         work.iteration_count, work.last_iterations = work.iteration_count + 1, done
         if not change <= LARGEST:
             return math.nan
-        if is_exact(change, before if done == least > 1 else LARGEST, limit, work):
+        if convergence.is_exact(change, before if done == least > 1 else LARGEST, limit, work):
             return 0.0
         if done > 1:
             ratio = change / before
             theta = ratio if done == 2 else math.sqrt(ratio * ratio_before)
             ratio_before = ratio
-            slow = not converges(theta, change, limit, most - 1 - done)
-            if slow and is_stalled(states, multipliers, limit, work):
+            slow = not convergence.converges(theta, change, limit, most - 1 - done)
+            if slow and convergence.is_stalled(states, multipliers, limit, work):
                 return 0.0
             work.convergence_rate = theta
-            patient = fixed or (slow and is_settling(multipliers, work))
-            if theta >= SLOWEST:
-                if is_at_rounding(change, limit, work):
+            patient = fixed or (slow and convergence.is_settling(multipliers, work))
+            if theta >= convergence.SLOWEST:
+                if convergence.is_at_rounding(change, limit, work):
                     return 0.0
                 if done > PATIENCE or not patient:
                     return UNFOUND
-                work.convergence_rate = SLOWEST
+                work.convergence_rate = convergence.SLOWEST
             theta = work.convergence_rate
             if least > 1 and max(before, change) <= UNSEEN_CHANGE * limit:
                 work.convergence_rate = min(theta, UNSEEN_RATE)

@@ -21,29 +21,11 @@ from dap3d_core.integrators.radau.newton import SAME_STEP, method_index, most_it
 from dap3d_core.integrators.radau.order import change_order, lower_order, raise_order
 from dap3d_core.integrators.radau.state import OLD, OLD_SLOPE, SLOPE, TRIAL_SLOPE, Given, RadauState
 from dap3d_core.integrators.radau.tableau import FEWEST
+from dap3d_core.integrators.stepping import event_location, step_control
 from dap3d_core.integrators.stepping import integration_state as at
-from dap3d_core.integrators.stepping.event_location import (
-    end_is_across,
-    is_sample_across,
-    next_length,
-    update_switches_after_step,
-)
 from dap3d_core.integrators.stepping.integration_state import Function
 from dap3d_core.integrators.stepping.output import may_step, needs_dense, project_state
 from dap3d_core.integrators.stepping.rounding import can_measure, record_failure
-from dap3d_core.integrators.stepping.step_control import (
-    LARGEST,
-    STEP_AFTER_FAILURE,
-    STEP_AFTER_SINGULAR_END,
-    STEP_CUT,
-    count_turns,
-    end_of_step,
-    first_step,
-    judge_turns,
-    lands_near_singularity,
-    reject,
-    step_floor,
-)
 from dap3d_core.integrators.stepping.switch_values import evaluate
 from dap3d_core.integrators.stepping.vector_ops import all_finite
 from dap3d_core.kernels.runtime.cache import compiled
@@ -93,7 +75,7 @@ def advance(
                 measure(work.t, h, work, given)
                 bound_stage_noise(h, work, rhs, system, loops)
         if work.calls_accepted != 0 and work.step_count > steps:
-            count_turns(work, accepted, system, loops)
+            step_control.count_turns(work, accepted, system, loops)
 
 
 @compiled
@@ -118,7 +100,7 @@ def start(work: RadauState, rhs: Function, project: Function, system: System, lo
     work.has_last_step = 0
     work.convergence_factor = 1.0
     if work.fixed_step == 0.0 and work.h == 0.0:
-        work.h = first_step(work, work.k, rhs, system, loops)
+        work.h = step_control.first_step(work, work.k, rhs, system, loops)
 
 
 @compiled
@@ -130,10 +112,10 @@ def step(
     rhs, project, accepted, watch = functions
     estimate_error, find_slope, find_work = parts[2], parts[3], parts[5]
     state, adaptive, t = work.state, work.fixed_step == 0.0, work.t
-    end = t1 = end_of_step(work)
+    end = t1 = step_control.end_of_step(work)
     longest = h = t1 - t
     if work.switch_count != 0 or min(work.step_limit, t + work.step_limit_at_switch) < t1:
-        h = next_length(work, t1, state[SLOPE], rhs, project, watch, system, loops)
+        h = event_location.next_length(work, t1, state[SLOPE], rhs, project, watch, system, loops)
         if h == 0.0:
             return
         t1 = t1 if h == longest else t + h
@@ -153,22 +135,22 @@ def step(
             find_slope(t, h, work, given)
             failure = complete_step(work, t1, h, watch, system, loops)
         if failure == at.RUNNING:
-            failure = judge_turns(work, t1, accepted, system, loops)
-        if failure == STEP_CUT:
+            failure = step_control.judge_turns(work, t1, accepted, system, loops)
+        if failure == step_control.STEP_CUT:
             return
-        if failure == at.RUNNING and adaptive and lands_near_singularity(work, t1):
+        if failure == at.RUNNING and adaptive and step_control.lands_near_singularity(work, t1):
             work.near_singular_landings += 1
-            reject(work, t1, h * STEP_AFTER_SINGULAR_END, at.STEP_FLOOR)
+            step_control.reject(work, t1, h * step_control.STEP_AFTER_SINGULAR_END, at.STEP_FLOOR)
         elif failure == at.RUNNING:
             work.near_singular_landings = 0
             accept(work, t1, h, error)
-            update_switches_after_step(work, h, longest, end)
+            event_location.update_switches_after_step(work, h, longest, end)
         else:
-            reject(work, t1, h * STEP_AFTER_FAILURE, failure)
-    elif error <= LARGEST:
+            step_control.reject(work, t1, h * step_control.STEP_AFTER_FAILURE, failure)
+    elif error <= step_control.LARGEST:
         reject_error(work, t1, h, error)
     else:
-        reject(work, t1, h * STEP_AFTER_FAILURE, at.NOT_FINITE)
+        step_control.reject(work, t1, h * step_control.STEP_AFTER_FAILURE, at.NOT_FINITE)
 
 
 @compiled
@@ -180,7 +162,7 @@ def stage_is_across(
     for i in range(work.stages - 1):
         for k in range(x.shape[0]):
             x[k] = work.state[at.Y, k] + work.Z[i, k]
-        if is_sample_across(work, t + c[i] * h, h, x, watch, system, loops):
+        if event_location.is_sample_across(work, t + c[i] * h, h, x, watch, system, loops):
             return True
     return False
 
@@ -225,13 +207,13 @@ def reject_iteration(work: RadauState, t1: float, h: float, shorter: float) -> N
     stale = work.tangent_is_current == 0
     work.tangent_needed = 1
     if not shorter > 0.0:  # NaN
-        reject(work, t1, h * STEP_AFTER_FAILURE, at.NOT_FINITE)
+        step_control.reject(work, t1, h * step_control.STEP_AFTER_FAILURE, at.NOT_FINITE)
     elif work.fixed_step == 0.0 or not stale:
         if not is_at_rounding(work.state_change, work.newton_limit, work):
             record_failure(work, work.state_change, h, work.last_rejected != 0)
         blame(work, h)
         again = work.last_rejected
-        reject(work, t1, h * shorter, at.STEP_FLOOR)
+        step_control.reject(work, t1, h * shorter, at.STEP_FLOOR)
         if work.status == at.RUNNING and lower_order(work, again) and work.regularisation != 0.0:
             # off the constraints dependent rows hold the motion, and their multipliers are no start
             work.first_stage_valid, work.h = 0, 0.0
@@ -244,7 +226,7 @@ def reject_error(work: RadauState, t1: float, h: float, error: float) -> None:
     work.error_refusals += 1
     factor = max(SHRINKAGE, safety_factor(work) / error ** (1.0 / (work.stages + 1)))
     lower_order(work, work.last_rejected)
-    reject(work, t1, h * factor, at.STEP_FLOOR)
+    step_control.reject(work, t1, h * factor, at.STEP_FLOOR)
     if work.has_last_step == 0:
         work.h = min(work.h, 0.1 * h)
     work.tangent_needed = max(work.tangent_needed, 1 - work.tangent_is_current)
@@ -284,8 +266,8 @@ def complete_step(
         return at.NOT_FINITE
     if work.switch_count != 0:
         evaluate(work, t1, work.state[at.TRIAL], at.FOUND, watch, system, loops)
-        if end_is_across(work, t1, slope, watch, system, loops):
-            return STEP_CUT
+        if event_location.end_is_across(work, t1, slope, watch, system, loops):
+            return step_control.STEP_CUT
     if needs_dense(work, t1):
         prepare_dense(h, work)
     return at.RUNNING
@@ -334,6 +316,6 @@ def choose_next(work: RadauState, h: float, error: float, good: bool) -> None:
         factor = min(factor, 1.0)
     work.accepted_error = max(error, 0.01)
     if not (good and 1.0 <= factor <= SAME_FACTORS):
-        work.h = max(h * factor, step_floor(work))
+        work.h = max(h * factor, step_control.step_floor(work))
     else:
         work.h = h

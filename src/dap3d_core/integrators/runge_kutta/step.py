@@ -26,15 +26,11 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import MODE_ENDS
 from dap3d_core.assembly.evaluate import copy
+from dap3d_core.integrators.runge_kutta import sums
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.runge_kutta.stiffness import detect_stiffness
-from dap3d_core.integrators.runge_kutta.sums import (
-    ABSCISSA,
-    combine,
-    error_beyond_rounding,
-    error_norm,
-)
 from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.integrators.stepping import singular_poses, step_control
 from dap3d_core.integrators.stepping.event_location import (
     end_is_across,
     is_cut_at_sample,
@@ -44,35 +40,6 @@ from dap3d_core.integrators.stepping.event_location import (
 from dap3d_core.integrators.stepping.integration_state import Function
 from dap3d_core.integrators.stepping.output import dense_state, needs_dense, project_state
 from dap3d_core.integrators.stepping.rounding import record_failure
-from dap3d_core.integrators.stepping.singular_poses import (
-    is_approaching,
-    is_at_singularity,
-    is_near_singularity,
-    limit_step_at_singularity,
-    predict_measures,
-    record_singularity,
-    time_to_singularity,
-    update_measures,
-)
-from dap3d_core.integrators.stepping.step_control import (
-    FROM_START,
-    LARGEST,
-    SINGULAR_END_ATTEMPTS,
-    SINGULAR_END_REACH,
-    STEP_AFTER_FAILURE,
-    STEP_AFTER_SINGULAR_END,
-    STEP_CUT,
-    accept,
-    advance_by,
-    combined_error,
-    end_of_step,
-    first_step,
-    judge_turns,
-    lands_near_singularity,
-    reject,
-    step_floor,
-    step_reduction,
-)
 from dap3d_core.integrators.stepping.switch_values import evaluate, near_edge
 from dap3d_core.integrators.stepping.vector_ops import all_finite, scaled_largest
 from dap3d_core.kernels.array_types import Floats
@@ -96,7 +63,10 @@ def advance(
 
     At least one step is tried in each call, whatever the budget.
     """
-    advance_by(step, dense_state, work, work.k[0], functions, system, loops, budget, FROM_START)
+    start = step_control.FROM_START
+    step_control.advance_by(
+        step, dense_state, work, work.k[0], functions, system, loops, budget, start
+    )
 
 
 @compiled
@@ -107,19 +77,19 @@ def step(work: RungeKuttaState, functions: Any, system: Any, loops: Any) -> None
         return
     adaptive = work.fixed_step == 0.0
     if adaptive and work.h == 0.0:
-        work.h = first_step(work, work.k, rhs, system, loops)
-    end = t1 = end_of_step(work)
+        work.h = step_control.first_step(work, work.k, rhs, system, loops)
+    end = t1 = step_control.end_of_step(work)
     longest = t1 - work.t
     h = longest
     if adaptive:
-        h = min(h, with_slopes(limit_step_at_singularity(work, longest), 0.0))
+        h = min(h, with_slopes(singular_poses.limit_step_at_singularity(work, longest), 0.0))
     if work.switch_count != 0 or min(work.step_limit, work.t + work.step_limit_at_switch) < t1:
         h = min(h, next_length(work, t1, work.k[0], rhs, project, watch, system, loops))
         if h == 0.0:
             return
     if h < longest:
         t1 = work.t + h
-    near = work.projects != 0 and is_near_singularity(work, longest)
+    near = work.projects != 0 and singular_poses.is_near_singularity(work, longest)
     if not take_stages(work, t1, h, near, functions, system, loops):
         return
     error = step_error(work, t1, h, near, project, system, loops)
@@ -142,8 +112,8 @@ def step_error(
     if near:
         error = projected_error_norm(work, t1, h, project, system, loops)
     else:
-        error = error_norm(work, h)
-    if 1.0 < error <= LARGEST:
+        error = sums.error_norm(work, h)
+    if 1.0 < error <= step_control.LARGEST:
         error = error_above_rounding(work, near, h, error)
     return error
 
@@ -170,29 +140,29 @@ def finish_step(
     if error <= 1.0:
         failure = complete_step(work, t1, near, has_rates, functions, system, loops)
         if failure == at.RUNNING:
-            failure = judge_turns(work, t1, accepted, system, loops)
-        if failure == STEP_CUT:
+            failure = step_control.judge_turns(work, t1, accepted, system, loops)
+        if failure == step_control.STEP_CUT:
             return
         other = 0.0
         if failure == at.RUNNING and work.fixed_step == 0.0 and not near:
             other = step_elsewhere(work, t1, h)
         if other > 0.0:
             work.near_singular_landings += 1
-            reject(work, t1, other, at.STEP_FLOOR)
+            step_control.reject(work, t1, other, at.STEP_FLOOR)
         elif failure == at.RUNNING:
             work.near_singular_landings = 0
-            if time_to_singularity(work, h) < h:
+            if singular_poses.time_to_singularity(work, h) < h:
                 work.error_across_singularity = 0.0
-            update_measures(work, h)
-            accept(work, t1, error)
+            singular_poses.update_measures(work, h)
+            step_control.accept(work, t1, error)
             update_switches_after_step(work, h, longest, end)
         else:
-            reject(work, t1, h * STEP_AFTER_FAILURE, failure)
-    elif error <= LARGEST:
+            step_control.reject(work, t1, h * step_control.STEP_AFTER_FAILURE, failure)
+    elif error <= step_control.LARGEST:
         record_failure(work, error, h, work.last_rejected != 0)
-        reject(work, t1, h * step_reduction(work, error), at.STEP_FLOOR)
+        step_control.reject(work, t1, h * step_control.step_reduction(work, error), at.STEP_FLOOR)
     else:
-        reject(work, t1, h * STEP_AFTER_FAILURE, at.NOT_FINITE)
+        step_control.reject(work, t1, h * step_control.STEP_AFTER_FAILURE, at.NOT_FINITE)
 
 
 @compiled
@@ -203,15 +173,15 @@ def step_elsewhere(work: RungeKuttaState, t1: float, h: float) -> float:
     errors bring the motion close to the state in steps too short to be placed about it. Behind the
     state, or while it is out of reach, there is none.
     """
-    if not (lands_near_singularity(work, t1) and is_approaching(work)):
+    if not (step_control.lands_near_singularity(work, t1) and singular_poses.is_approaching(work)):
         return 0.0
-    predict_measures(work, h)
-    if limit_step_at_singularity(work, h) < h:
+    singular_poses.predict_measures(work, h)
+    if singular_poses.limit_step_at_singularity(work, h) < h:
         return h
-    left = time_to_singularity(work, work.times[-1] - work.t)
-    if left < SINGULAR_END_REACH * h:
+    left = singular_poses.time_to_singularity(work, work.times[-1] - work.t)
+    if left < step_control.SINGULAR_END_REACH * h:
         return left / work.widest_gap_abscissa
-    return 0.0 if left < np.inf else h * STEP_AFTER_SINGULAR_END
+    return 0.0 if left < np.inf else h * step_control.STEP_AFTER_SINGULAR_END
 
 
 @compiled
@@ -231,8 +201,8 @@ def error_above_rounding(work: RungeKuttaState, near: bool, h: float, error: flo
     """The error of a step that is too large, without what a shorter step could not reduce."""
     if near:
         return 1.0 if is_rounding(work, h, error) else error
-    if h * step_reduction(work, error) < step_floor(work):
-        return min(error, error_beyond_rounding(work, h))
+    if h * step_control.step_reduction(work, error) < step_control.step_floor(work):
+        return min(error, sums.error_beyond_rounding(work, h))
     return error
 
 
@@ -248,9 +218,9 @@ def take_stages(
     last = stages if work.error_uses_last_stage != 0 else stages - 1
     for i in range(1, stages + 1):
         x = work.state[at.TRIAL] if i == stages else work.state[at.SCRATCH]
-        combine(x, 1.0, work.state[at.Y], h, table, i, k)
+        sums.combine(x, 1.0, work.state[at.Y], h, table, i, k)
         if i <= last:
-            c = table[i, ABSCISSA]
+            c = table[i, sums.ABSCISSA]
             t = t1 if c == 1.0 else work.t + c * h
             if not evaluate_stage(work, i, t, x, t1, near, functions, system, loops):
                 return False
@@ -284,21 +254,23 @@ def cut_at_stage(work: RungeKuttaState, t: float, t1: float) -> bool:
     state has rates that are not known, and tells where that is: the step is placed about it. The
     first step of a run from a singular state is not cut: longer ones are the better ones there.
     """
-    if is_at_singularity(work):
+    if singular_poses.is_at_singularity(work):
         return False
     if work.fixed_step != 0.0:
         return False
     h, jump = t1 - work.t, projection_jump(work, work.state[at.OTHER], work.state[at.SCRATCH])
     if not jump <= 1.0:
-        reject(work, t1, h * max(work.factor_min, work.safety / math.sqrt(jump)), at.STEP_FLOOR)
+        step_control.reject(
+            work, t1, h * max(work.factor_min, work.safety / math.sqrt(jump)), at.STEP_FLOOR
+        )
         return True
-    has_choice = t1 + step_floor(work) < work.step_limit
-    if work.near_singular_landings >= SINGULAR_END_ATTEMPTS or not has_choice:
+    has_choice = t1 + step_control.step_floor(work) < work.step_limit
+    if work.near_singular_landings >= step_control.SINGULAR_END_ATTEMPTS or not has_choice:
         return False
-    if not record_singularity(work, t - work.t):
+    if not singular_poses.record_singularity(work, t - work.t):
         return False
     work.near_singular_landings += 1
-    reject(work, t1, h, at.STEP_FLOOR)
+    step_control.reject(work, t1, h, at.STEP_FLOOR)
     return True
 
 
@@ -370,13 +342,13 @@ def projected_error_norm(
     for i in range(work.error_size):
         least = max(least, POSITION_NOISE * abs(y[i]))
     for e in range(work.estimate_count):
-        combine(other, 1.0, trial, -h, table, k.shape[0] + e, k)
+        sums.combine(other, 1.0, trial, -h, table, k.shape[0] + e, k)
         project_state(work, t1, other, project, system, loops)
         for i in range(other.size):
             other[i] -= result[i]
         size = scaled_largest(work.state[at.GIVEN], other, y, result, work.error_size, work.rtol,
                               work.tolerance, h, least)  # fmt: skip
-        main = size if e == 0 else combined_error(main, size)
+        main = size if e == 0 else step_control.combined_error(main, size)
     return main
 
 
@@ -386,7 +358,7 @@ def is_rounding(work: RungeKuttaState, h: float, error: float) -> bool:
 
     It is mostly in the direction that projection takes away from there on.
     """
-    if not (time_to_singularity(work, h) < h and error < MAX_ROUNDING_ERROR):
+    if not (singular_poses.time_to_singularity(work, h) < h and error < MAX_ROUNDING_ERROR):
         return False
     before, work.error_across_singularity = work.error_across_singularity, error
     return before > 0.0 and error > 0.25 * before
@@ -421,7 +393,7 @@ def complete_step(
                 rhs(t1, trial, k[result], system, loops)
             known = True
         if not take_dense_stages(work, t1, near, functions, system, loops):
-            return STEP_CUT
+            return step_control.STEP_CUT
         work.rhs_count += k.shape[0] - 1 - result
         here = here and k.shape[0] == result + 1
         prepare_dense(work, t1)
@@ -447,7 +419,7 @@ def complete_step(
     if known and not all_finite(k[result]):
         return at.NOT_FINITE
     if watched and end_is_across(work, t1, k[result], watch, system, loops):
-        return STEP_CUT
+        return step_control.STEP_CUT
     work.first_stage_valid = 1 if known else 0
     return at.RUNNING
 
@@ -459,8 +431,8 @@ def take_dense_stages(
     """The further stages that dense output needs; False as for ``take_stages``."""
     t, argument, table, k = work.t, work.state[at.SCRATCH], work.table, work.k
     for i in range(work.stage_count + 1, k.shape[0]):
-        instant = t + table[i, ABSCISSA] * (t1 - t)
-        combine(argument, 1.0, work.state[at.Y], t1 - t, table, i, k)
+        instant = t + table[i, sums.ABSCISSA] * (t1 - t)
+        sums.combine(argument, 1.0, work.state[at.Y], t1 - t, table, i, k)
         if not evaluate_stage(work, i, instant, argument, t1, near, functions, system, loops):
             return False
     return True
@@ -490,5 +462,5 @@ def prepare_dense(work: RungeKuttaState, t1: float) -> None:
         terms[3, i] = rise - h * k[result, i] - terms[2, i]
     first = k.shape[0] + work.estimate_count
     for row in range(4, terms.shape[0]):
-        combine(terms[row], 0.0, state[at.Y], h, work.table, first + row - 4, k)
+        sums.combine(terms[row], 0.0, state[at.Y], h, work.table, first + row - 4, k)
     work.t_dense, work.h_dense = work.t, h

@@ -22,13 +22,7 @@ SLOW_STEP = 1e-7
 
 @compiled
 def project_state(
-    work: Any,
-    t: float,
-    y: Floats,
-    project: Function,
-    system: Any,
-    loops: Any,
-    here: bool = False,
+    work: Any, t: float, y: Floats, project: Function, system: Any, loops: Any, here: bool = False
 ) -> int:
     """Project y where that is on; the failure, or RUNNING.
 

@@ -20,13 +20,7 @@ ALONG = 1e6
 
 @compiled
 def evaluate(
-    work: IntegrationState,
-    t: float,
-    x: Floats,
-    row: int,
-    watch: Function,
-    system: Any,
-    loops: Any,
+    work: IntegrationState, t: float, x: Floats, row: int, watch: Function, system: Any, loops: Any
 ) -> None:
     """The switches at a state, into a row.
 

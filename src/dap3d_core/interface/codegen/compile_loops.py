@@ -4,20 +4,8 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
+from dap3d_core.interface.codegen import loop_source
 from dap3d_core.interface.codegen.kernel_arguments import parameters
-from dap3d_core.interface.codegen.loop_source import (
-    JUMP_KINDS,
-    JUMP_NAMES,
-    LOOP_KINDS,
-    append,
-    called_with,
-    computes_rate,
-    gathering_lines,
-    jump_lines,
-    kernels_of,
-    store,
-    store_angle,
-)
 from dap3d_core.interface.codegen.reactions import with_sample_reactions
 from dap3d_core.interface.codegen.specialise import bind_friction
 from dap3d_core.interface.codegen.type_info import TypeInfo
@@ -29,8 +17,8 @@ from dap3d_core.kernels.runtime.loop_modules import Loop, build, build_different
 
 def write(type_info: TypeInfo, what: str) -> Loop | None:
     """The loop that computes ``what`` (a key of LOOP_KINDS); None where there is no such kernel."""
-    names = kernels_of(type_info.type.kind, what)
-    if what == "wrench" and computes_rate(type_info):
+    names = loop_source.kernels_of(type_info.type.kind, what)
+    if what == "wrench" and loop_source.computes_rate(type_info):
         names = (*names, "rate")
     kernels = {n: k for n, k in type_info.kernels.items() if n in names}
     if what == "impulse" and "impulse" not in kernels:
@@ -45,20 +33,20 @@ def write(type_info: TypeInfo, what: str) -> Loop | None:
         from dap3d_core.interface.codegen.unknowns import write_with_unknowns
 
         return write_with_unknowns(type_info, what, kernels, wanted)
-    if what in JUMP_KINDS:
-        wanted = [n for n in wanted if n not in JUMP_NAMES]
+    if what in loop_source.JUMP_KINDS:
+        wanted = [n for n in wanted if n not in loop_source.JUMP_NAMES]
     reads = type_info.joints if what in ("friction", "rate") else ()
-    lines = list(gathering_lines(type_info, wanted, reactions=bool(reads)))
+    lines = list(loop_source.gathering_lines(type_info, wanted, reactions=bool(reads)))
     if what == "angle":
         for name, at in layout.angles.items():
-            lines += store_angle(name, at)
+            lines += loop_source.store_angle(name, at)
     elif what == "turned":
-        lines += append([f"x_{name}" for name in layout.angles])
-    if what in JUMP_KINDS:
-        lines += jump_lines(type_info, what, kernels)
-    for name in kernels if what not in JUMP_KINDS else ():
-        lines.append(f"out = {called_with(type_info, name)}")
-        lines += store(type_info, name)
+        lines += loop_source.append([f"x_{name}" for name in layout.angles])
+    if what in loop_source.JUMP_KINDS:
+        lines += loop_source.jump_lines(type_info, what, kernels)
+    for name in kernels if what not in loop_source.JUMP_KINDS else ():
+        lines.append(f"out = {loop_source.called_with(type_info, name)}")
+        lines += loop_source.store(type_info, name)
     title = f"{type_info.type.keyword}{type_info.given}: {', '.join(kernels) or what}"
     called = {f"kernel_{n}": k for n, k in kernels.items()}
     called |= {f"kernel_J_{joint.field}": joint.type_info.kernels["J"] for joint in reads}
@@ -121,7 +109,7 @@ def compile_all(type_info: TypeInfo) -> None:
         PluginError: one of them cannot be compiled.
     """
     if not _calls_functions(type_info) and not sized_fields(type_info.type):
-        for what in LOOP_KINDS:
+        for what in loop_source.LOOP_KINDS:
             if what != "friction":
                 compiled_loop(with_sample_reactions(type_info), what)
         if type_info.type.kind == "joint" and "friction" in type_info.kernels:

@@ -11,17 +11,9 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.interface.codegen import loop_source
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH
 from dap3d_core.interface.codegen.kernel_arguments import parameters
-from dap3d_core.interface.codegen.loop_source import (
-    append,
-    called_with,
-    gathering_lines,
-    keep,
-    kept,
-    store,
-    store_angle,
-)
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.element_states import GREATEST, LEAST
 from dap3d_core.interface.types import Joint
@@ -52,7 +44,7 @@ def write_with_unknowns(
     rates = any(f"{name}_dot" in wanted for name in unknowns) or what == "angle"
     finding = [n for n in ("C", "G", *(("J", "nu") if rates else ())) if n in type_info.kernels]
     wanted = wanted + [n for kernel in finding for n in parameters(type_info.kernels[kernel])]
-    lines = list(gathering_lines(type_info, wanted))
+    lines = list(loop_source.gathering_lines(type_info, wanted))
     lines += solving_lines(type_info, what, rates)
     if what == "acceleration":
         lines += store_acceleration(type_info)
@@ -61,19 +53,19 @@ def write_with_unknowns(
     elif what == "angle":
         for name, at in layout.angles.items():
             is_unknown = name in unknowns
-            found = keep(at, kept_value(type_info, name), f"x_{name}_dot")
-            lines += found if is_unknown else store_angle(name, at)
+            found = loop_source.keep(at, kept_value(type_info, name), f"x_{name}_dot")
+            lines += found if is_unknown else loop_source.store_angle(name, at)
         lines.append("_, _, signs = eliminate(G, (), signs)")
-        lines += [kept(f"par[p1 + {layout.angles[name] + ANGLE_WIDTH}]", f"signs[{k}]")
+        lines += [loop_source.kept(f"par[p1 + {layout.angles[name] + ANGLE_WIDTH}]", f"signs[{k}]")
                   for k, name in enumerate(unknowns)]  # fmt: skip
     elif what == "turned":
-        lines += append([kept_value(type_info, name) for name in layout.angles])
+        lines += loop_source.append([kept_value(type_info, name) for name in layout.angles])
     elif what == "bound":
-        lines += append(bounds)
+        lines += loop_source.append(bounds)
     else:
         for name in kernels:
-            lines.append(f"out = {called_with(type_info, name)}")
-            lines += store(type_info, name)
+            lines.append(f"out = {loop_source.called_with(type_info, name)}")
+            lines += loop_source.store(type_info, name)
     title = f"{type_info.type.keyword}{type_info.given}: {', '.join(kernels) or what}"
     called = {f"kernel_{n}": type_info.kernels[n] for n in (*kernels, *finding)}
     return Loop(title, called | FUNCTIONS, lines)
@@ -91,7 +83,7 @@ def solving_lines(type_info: TypeInfo, what: str, rates: bool) -> Iterator[str]:
     for kernel, shape in (("C", None), ("G", len(unknowns))):
         paths = type_info.outputs[kernel]
         text = _tuple(paths) if shape is None else _rows(paths, count, shape)
-        call = called_with(type_info, kernel)
+        call = loop_source.called_with(type_info, kernel)
         yield f"{kernel}_of = lambda {names[:-2]}: (lambda out: {text})({call})"
     yield f"{names}= solved(({names}), C_of, G_of)"
     if what not in ("angle", "turned"):  # a start may be found from far by several calls
@@ -101,9 +93,9 @@ def solving_lines(type_info: TypeInfo, what: str, rates: bool) -> Iterator[str]:
     yield f"signs = {_tuple(places)}"
     if rates:
         has_nu = "nu" in type_info.kernels
-        yield f"J = {called_with(type_info, 'J')}"
+        yield f"J = {loop_source.called_with(type_info, 'J')}"
         if has_nu:
-            yield f"nu = {called_with(type_info, 'nu')}"
+            yield f"nu = {loop_source.called_with(type_info, 'nu')}"
         rows = [_rate(type_info, row, has_nu) for row in _joint(type_info).position_rows()]
         yield f"own_rates = least_change(G, {_tuple(rows)})"
         yield from (f"x_{name}_dot = -own_rates[{k}]" for k, name in enumerate(unknowns))
@@ -112,7 +104,7 @@ def solving_lines(type_info: TypeInfo, what: str, rates: bool) -> Iterator[str]:
 def store_position(type_info: TypeInfo) -> Iterator[str]:
     """Call C, and store the rows that remain."""
     unknowns = len(type_info.layout.unknowns)
-    yield f"out = {called_with(type_info, 'C')}"
+    yield f"out = {loop_source.called_with(type_info, 'C')}"
     yield f"_, reduced, _ = eliminate(G, ({_tuple(type_info.outputs['C'])},), signs)"
     for r in range(len(_joint(type_info).position_rows()) - unknowns):
         yield f"out1[row + {r}] = reduced[0][{unknowns + r}]"
@@ -125,7 +117,7 @@ def store_acceleration(type_info: TypeInfo) -> Iterator[str]:
     position, velocity, slots = type_.position_rows(), type_.velocity_rows(), len(layout.slots)
     kernels = [name for name in ("J", "gamma", "nu") if name in type_info.kernels]
     for name in kernels:
-        yield f"{name} = {called_with(type_info, name)}"
+        yield f"{name} = {loop_source.called_with(type_info, name)}"
     entry = _entries(type_info)
     columns = [[entry("J", n, r, c) for r in position] for n in range(slots) for c in range(6)]
     columns += [[entry(name, r) for r in position] for name in kernels[1:]]

@@ -9,15 +9,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.kernels.compiler import types as t
-from dap3d_core.kernels.compiler.writer import (
-    COUNT,
-    EXACT,
-    LIBRARY,
-    SLOPE,
-    SLOPES,
-    VALUES,
-    Writer,
-)
+from dap3d_core.kernels.compiler.writer import COUNT, EXACT, LIBRARY, SLOPE, SLOPES, VALUES, Writer
 
 #: Python functions by the name of their compiled form.
 KNOWN: dict[Any, str] = {

@@ -13,13 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dap3d_core.kernels.compiler.objects import (
-    Processor,
-    decoded,
-    encoded,
-    host_features,
-    processor,
-)
+from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.runtime.sealed_files import sealed, unsealed
 
 #: The folder of the files in an installed package.
@@ -33,7 +27,7 @@ _SYSTEMS = {
 _ARCHITECTURES = {"x86_64": "x86-64", "aarch64": "arm64", "arm64": "arm64"}
 #: Processors that objects are compiled for, by the names of their files.
 TARGETS = {
-    f"{system}-{level}": Processor(f"{architecture}-{rest}", name, "")
+    f"{system}-{level}": objects.Processor(f"{architecture}-{rest}", name, "")
     for system, (rest, _) in _SYSTEMS.items()
     for level, architecture, name in (
         ("x86-64", "x86_64", "x86-64"),
@@ -63,10 +57,10 @@ def packed(units: dict[str, tuple[list[Any], bytes]]) -> bytes:
     """The content of a file from results and code of units, by name."""
     index, blobs = {}, b""
     for name, unit in sorted(units.items()):
-        blob = lzma.compress(encoded(*unit), **_COMPRESSION)
+        blob = lzma.compress(objects.encoded(*unit), **_COMPRESSION)
         index[name] = len(blobs), len(blobs) + len(blob)
         blobs += blob
-    return sealed(encoded(index, blobs))
+    return sealed(objects.encoded(index, blobs))
 
 
 class Pack(NamedTuple):
@@ -83,7 +77,7 @@ class Pack(NamedTuple):
         except OSError:  # not every package has one
             return cls({}, b"")
         if content is not None:
-            return cls(*decoded(content))
+            return cls(*objects.decoded(content))
         warnings.warn(
             f"ready-made code was damaged and is made here: {path}; installing dap3d again "
             "repairs it", RuntimeWarning, stacklevel=1,
@@ -95,7 +89,7 @@ class Pack(NamedTuple):
         if name not in self.index:
             return None
         first, last = self.index[name]
-        return decoded(lzma.decompress(self.units[first:last], **_COMPRESSION))
+        return objects.decoded(lzma.decompress(self.units[first:last], **_COMPRESSION))
 
 
 @cache
@@ -112,5 +106,5 @@ def read(name: str, target: str | None = None) -> tuple[list[Any], bytes] | None
         target: by default that of this machine, unless ``DAP3D_CPU`` names another processor.
     """
     if target is None and not os.environ.get("DAP3D_CPU"):
-        target = target_of(processor().triple, host_features())
+        target = target_of(objects.processor().triple, objects.host_features())
     return _pack(target).read(name) if name and target else None

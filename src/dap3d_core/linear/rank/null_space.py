@@ -75,13 +75,7 @@ class Problem:
         return result
 
 
-def problem_of(
-    plan: Plan,
-    D: Floats,
-    chosen: Integers,
-    tolerance: float,
-    blur: float,
-) -> Problem:
+def problem_of(plan: Plan, D: Floats, chosen: Integers, tolerance: float, blur: float) -> Problem:
     """Gather what both ways need.
 
     Args:

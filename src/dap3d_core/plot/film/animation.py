@@ -16,14 +16,8 @@ import numpy as np
 from dap3d_core.model.groups import Floats
 from dap3d_core.plot.figure_file import FORMATS as PICTURES
 from dap3d_core.plot.figure_file import fixed_files
+from dap3d_core.plot.film import projection
 from dap3d_core.plot.film.frame import Stage
-from dap3d_core.plot.film.projection import (
-    camera_of,
-    leaves,
-    round_number,
-    visible_rectangle,
-    with_margin,
-)
 from dap3d_core.plot.film.stick_figure import pose_at, sticks_of
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result, ResultError
@@ -226,19 +220,19 @@ def _stage_of(
     about = None if follow is None else result.summary.body_names.index(follow)
     sticks = sticks_of(result, model, still=still)
     extent = sticks.extent(result, np.eye(3))
-    camera = camera_of(view, extent)
+    camera = projection.camera_of(view, extent)
     limits = sticks.limits
     if limits is None or fit or about is not None:
-        limits = with_margin(extent)
+        limits = projection.with_margin(extent)
     room = limits
     if about is not None:
         near = sticks.extent(result, np.eye(3), about)
-        room = with_margin(near)
+        room = projection.with_margin(near)
         limits[2] = extent[2] + (room - near)[2]  # the floor is as near as to a short motion
-    seen = visible_rectangle(camera, room, sticks.extent(result, camera.axes, about))
+    seen = projection.visible_rectangle(camera, room, sticks.extent(result, camera.axes, about))
     stage = Stage(sticks, camera, limits, seen, size, result.record.title, about)
     notes = () if sticks.shapes is None else sticks.shapes.notes
-    return stage, (*notes, BEYOND) if leaves(limits, extent, camera) else notes
+    return stage, (*notes, BEYOND) if projection.leaves(limits, extent, camera) else notes
 
 
 def _frames(
@@ -291,7 +285,7 @@ def usual_speed(duration: float) -> float:
     """1 for motions of a length that suits real time, else a round number."""
     if duration <= 0.0 or SHORTEST <= duration <= LONGEST:
         return 1.0
-    return round_number(duration / ABOUT)
+    return projection.round_number(duration / ABOUT)
 
 
 def frame_times(t: Floats, fps: float, speed: float) -> Floats:

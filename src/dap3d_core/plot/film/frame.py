@@ -11,14 +11,7 @@ from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.plot.film.projection import (
-    AXES,
-    PLANES,
-    Camera,
-    fill_limits,
-    floor_grid,
-    round_number,
-)
+from dap3d_core.plot.film import projection
 from dap3d_core.plot.film.stick_figure import Sticks
 from dap3d_core.plot.style import LETTERS, WIDTH, columns_of, shown_text
 
@@ -52,7 +45,7 @@ class Stage:
     def __init__(
         self,
         sticks: Sticks,
-        camera: Camera,
+        camera: projection.Camera,
         limits: Floats,
         shown: Floats,
         size: tuple[int, int],
@@ -166,13 +159,13 @@ class Stage:
         self.figure.set_figheight(height)
         high = max(0.3, height - TOP - below)
         ax = self.figure.add_axes((left / WIDTH, below / height, wide / WIDTH, high / height))
-        self._window = (x0, x1), (y0, y1) = fill_limits(shown, wide, high)
+        self._window = (x0, x1), (y0, y1) = projection.fill_limits(shown, wide, high)
         ax.set_xlim(x0, x1)
         ax.set_ylim(y0, y1)
         if plane:
-            right, up = PLANES[plane]
-            ax.set_xlabel(f"{AXES[right]} [m]", fontsize=LETTERS, labelpad=1.0)
-            ax.set_ylabel(f"{AXES[up]} [m]", fontsize=LETTERS, labelpad=1.0)
+            right, up = projection.PLANES[plane]
+            ax.set_xlabel(f"{projection.AXES[right]} [m]", fontsize=LETTERS, labelpad=1.0)
+            ax.set_ylabel(f"{projection.AXES[up]} [m]", fontsize=LETTERS, labelpad=1.0)
             ax.tick_params(labelsize=LETTERS, length=2.5, pad=2.0)
             ax.grid(True, color=GRID, linewidth=0.6)
             ax.set_axisbelow(True)
@@ -192,8 +185,8 @@ class Stage:
         size = float(np.max(self.limits[:2, 1] - self.limits[:2, 0]))
         if self._about is not None:
             size = self._window[0][1] - self._window[0][0]
-        spacing = round_number(size / 6.0)
-        lines = self.camera.project(floor_grid(self.limits, spacing))
+        spacing = projection.round_number(size / 6.0)
+        lines = self.camera.project(projection.floor_grid(self.limits, spacing))
         self.ax.add_collection(
             LineCollection(list(lines), colors=GRID, linewidths=0.7, zorder=0), autolim=False
         )
@@ -201,7 +194,7 @@ class Stage:
         self._text(0.985, bottom, f"grid {spacing:g} m", "right", "bottom", color=PALE)
         length, corner = 0.24, np.array([0.3, 0.2 + bottom * height])  # inches
         scale = np.array([WIDTH, height])
-        for k, name in enumerate(AXES):
+        for k, name in enumerate(projection.AXES):
             tip = length * self.camera.project(np.eye(3)[k])
             if np.linalg.norm(tip) < 0.2 * length:
                 continue

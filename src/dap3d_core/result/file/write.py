@@ -10,14 +10,7 @@ import attrs
 
 from dap3d_core.result.arrays import Arrays, ModelSummary
 from dap3d_core.result.errors import ResultError
-from dap3d_core.result.file.atomic_write import (
-    check_target,
-    check_utf8,
-    named_part,
-    reserve,
-    synchronise,
-    whole_file,
-)
+from dap3d_core.result.file import atomic_write
 from dap3d_core.result.file.checksum import write_checksums
 from dap3d_core.result.file.library import NETCDF, created, opened, writing
 from dap3d_core.result.file.schema import allocate_rows, define, write_rows, write_times
@@ -36,9 +29,9 @@ def save(
     Raises:
         ResultError: the file cannot be written, or exists and ``force`` is off.
     """
-    check_utf8("write", path)
+    atomic_write.check_utf8("write", path)
     target = Path(path)
-    with whole_file(path, force) as part:
+    with atomic_write.whole_file(path, force) as part:
         with created(part, target) as dataset:
             rows = define(dataset, summary, record, len(arrays), with_error=arrays.has_error)
             first = 0
@@ -62,8 +55,8 @@ class GrowingFile:
     """
 
     def __init__(self, path: str | os.PathLike[str], force: bool) -> None:
-        check_utf8("write", path)
-        self.target = check_target(path, force)
+        atomic_write.check_utf8("write", path)
+        self.target = atomic_write.check_target(path, force)
         self.part = self.target.with_name(f"{self.target.name}.part")
 
     @contextmanager
@@ -72,10 +65,10 @@ class GrowingFile:
 
         A process that is killed meanwhile leaves no half-defined part.
         """
-        new = reserve(self.target)
+        new = atomic_write.reserve(self.target)
         try:
             yield new
-            self.part = named_part(new, self.target)
+            self.part = atomic_write.named_part(new, self.target)
         except BaseException:
             new.unlink(missing_ok=True)
             raise
@@ -161,7 +154,7 @@ class ResultWriter(GrowingFile):
             ResultError: the system refuses.
         """
         with writing(self.part):
-            synchronise(self.part)
+            atomic_write.synchronise(self.part)
 
     def close(self) -> None:
         """Closes the part."""

@@ -12,13 +12,8 @@ from dap3d_core.result.arrays import AXES
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.file.atomic_write import whole_file
 from dap3d_core.result.post.force_output import DENSE_ROWS, jacobians
+from dap3d_core.result.quantities import lookup
 from dap3d_core.result.quantities.catalogue import ACTIONS, MOTION, SYSTEM, Quantity
-from dap3d_core.result.quantities.lookup import (
-    CONTACT_QUANTITIES,
-    available_outputs,
-    find,
-    joint_coordinates,
-)
 
 if TYPE_CHECKING:
     from dap3d_core.result.result import Result
@@ -65,11 +60,11 @@ def columns_of(result: "Result", reactions: bool = True) -> list[TableColumn]:
         columns.append(TableColumn(f"{joint}.lambda.{number}", "SI", result.Lam[:, row]))
     if reactions:
         columns.extend(_of_joints(result))
-        points, names = result.summary.contact_points, CONTACT_QUANTITIES
-        contacts = (find(result, f"{point}.{name}") for point in points for name in names)
-        for quantity in (*joint_coordinates(result), *contacts):
+        points, names = result.summary.contact_points, lookup.CONTACT_QUANTITIES
+        contacts = (lookup.find(result, f"{point}.{name}") for point in points for name in names)
+        for quantity in (*lookup.joint_coordinates(result), *contacts):
             columns.extend(_of_quantity(quantity))
-    for output in available_outputs(result):
+    for output in lookup.available_outputs(result):
         columns.extend(_of_quantity(output))
     return columns + others
 
@@ -83,7 +78,7 @@ def selected(result: "Result", names: Iterable[str]) -> list[TableColumn]:
     """
     columns = {"t": TableColumn("t", "s", result.t)}
     for name in names:
-        columns |= {column.name: column for column in _of_quantity(find(result, name))}
+        columns |= {column.name: column for column in _of_quantity(lookup.find(result, name))}
     return list(columns.values())
 
 

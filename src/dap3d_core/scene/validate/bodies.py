@@ -7,17 +7,8 @@ import numpy as np
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.errors import MISSING, dotted
 from dap3d_core.scene.tables import NO_TURN, Body
+from dap3d_core.scene.validate import coerce_values
 from dap3d_core.scene.validate.coerce_columns import Keys, numbers, vectors
-from dap3d_core.scene.validate.coerce_values import (
-    UNIT_LENGTH_ROUNDING,
-    UNIT_TOLERANCE,
-    Fault,
-    from_axis_angle,
-    from_rpy,
-    matrix_of,
-    not_unit,
-    numbers_of,
-)
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.validated_scene import Bodies
 
@@ -104,15 +95,15 @@ def _quaternions(report: Collector, keys: Keys, given: list[Any]) -> Floats:
     p = vectors(report, keys, given, 4)
     length = np.sqrt(np.einsum("nk,nk->n", p, p))
     deviation = np.abs(length - 1.0)
-    for k in np.flatnonzero(deviation > UNIT_LENGTH_ROUNDING):
+    for k in np.flatnonzero(deviation > coerce_values.UNIT_LENGTH_ROUNDING):
         if length[k] == 0.0:
             what = "Euler parameters of zero length mean no rotation at all"
             remedy = "write [1.0, 0.0, 0.0, 0.0] for a body that is not turned"
             report.add(keys[k], given[k], what, remedy=remedy)
-        elif deviation[k] > UNIT_TOLERANCE:
+        elif deviation[k] > coerce_values.UNIT_TOLERANCE:
             unit = ", ".join(f"{x:.16g}" for x in p[k] / length[k])
             remedy = f"if the direction is meant, write [{unit}]"
-            report.add(keys[k], given[k], not_unit(length[k]), remedy=remedy)
+            report.add(keys[k], given[k], coerce_values.not_unit(length[k]), remedy=remedy)
         else:
             text = f"{dotted(keys[k])}: length {length[k]:.12g}, normalised to 1"
             report.note(text, "Euler parameters normalised")
@@ -132,9 +123,9 @@ def _orientation(report: Collector, name: str, body: Body) -> Any:
         report.add(("bodies", name, next(iter(given))), next(iter(given.values())), what)
         return NO_TURN
     [(field, value)] = given.items()
-    reader = from_rpy if field == "rpy" else from_axis_angle
+    reader = coerce_values.from_rpy if field == "rpy" else coerce_values.from_axis_angle
     p = report.read(("bodies", name, field), value, reader)
-    return NO_TURN if isinstance(p, Fault) else p
+    return NO_TURN if isinstance(p, coerce_values.Fault) else p
 
 
 def _inertias(report: Collector, names: tuple[str, ...], bodies: list[Body]) -> Floats:
@@ -148,8 +139,8 @@ def _inertias(report: Collector, names: tuple[str, ...], bodies: list[Body]) -> 
         diagonal = vectors(report, flat_keys, [given[k] for k in flat], 3, _diagonal_of)
         J[flat] = np.einsum("nk,kl->nkl", diagonal, np.eye(3))
     for k in np.flatnonzero(is_full):
-        matrix = report.read(keys[k], given[k], matrix_of)
-        J[k] = np.nan if isinstance(matrix, Fault) else matrix
+        matrix = report.read(keys[k], given[k], coerce_values.matrix_of)
+        J[k] = np.nan if isinstance(matrix, coerce_values.Fault) else matrix
     J[~np.isfinite(J).all(axis=(1, 2))] = np.eye(3)
     if any(is_full):
         J = _symmetric(report, keys, given, J)
@@ -159,14 +150,14 @@ def _inertias(report: Collector, names: tuple[str, ...], bodies: list[Body]) -> 
 
 def _diagonal_of(value: Any) -> Any:
     """The diagonal of an inertia matrix, or its fault."""
-    diagonal = numbers_of(value, 3)
-    if not isinstance(diagonal, Fault) or (type(value) is tuple and len(value) == 3):
+    diagonal = coerce_values.numbers_of(value, 3)
+    if not isinstance(diagonal, coerce_values.Fault) or (type(value) is tuple and len(value) == 3):
         return diagonal
     count = f"has {len(value)} numbers" if type(value) is tuple else "is no list"
     remedy = diagonal.remedy
     if type(value) is tuple and len(value) == 9:
         remedy = "write three rows: [[..., ..., ...], [..., ..., ...], [..., ..., ...]]"
-    return Fault(f"should be 3 numbers (the diagonal) or 3x3; it {count}", remedy)
+    return coerce_values.Fault(f"should be 3 numbers (the diagonal) or 3x3; it {count}", remedy)
 
 
 def _symmetric(report: Collector, keys: Keys, given: list[Any], J: Floats) -> Floats:

@@ -20,16 +20,8 @@ from dap3d_core.assembly.arrays import CHECKPOINTED
 from dap3d_core.integrators.stepping.integration_state import MOST_COUNTED
 from dap3d_core.kernels.runtime.source_digest import driver_digest
 from dap3d_core.result import Computed, Result, ResultError, current_versions, open_result
+from dap3d_core.result.file import validate
 from dap3d_core.result.file.atomic_write import beginning, whole_file
-from dap3d_core.result.file.validate import (
-    Form,
-    are_texts,
-    check_forms,
-    is_number,
-    is_table_of_texts,
-    is_text,
-    list_of,
-)
 from dap3d_core.result.metadata import to_json
 from dap3d_core.settings import METHODS
 from dap3d_core.simulation.errors import CheckpointError
@@ -50,22 +42,22 @@ def is_count(value: Any) -> bool:
 
 
 def _is_duration(value: Any) -> bool:
-    return is_number(value) and value >= 0.0
+    return validate.is_number(value) and value >= 0.0
 
 
 #: Keys of a header.
-KEYS: dict[str, Form] = {
-    **dict.fromkeys(("run", "output", "scene", "driver", DIGEST), (is_text, "a text")),
+KEYS: dict[str, validate.Form] = {
+    **dict.fromkeys(("run", "output", "scene", "driver", DIGEST), (validate.is_text, "a text")),
     "method": (lambda value: value in METHODS, f"one of {', '.join(METHODS)}"),
     "integrations": (lambda value: type(value) is int and value in (1, 2), "1 or 2"),
-    "crossed": (list_of(_is_duration), "a list of times in seconds"),
+    "crossed": (validate.list_of(_is_duration), "a list of times in seconds"),
     "until": (lambda value: value is None or _is_duration(value), "a time in seconds, or null"),
     "rows": (is_count, "a count"),
     **dict.fromkeys(("t", "wall_time_s", "compile_time_s"), (_is_duration, "a time in seconds")),
     "settings": (lambda value: isinstance(value, dict), "a table"),
     "estimate_error": (lambda value: isinstance(value, bool), "true or false"),
-    "notes": (are_texts, "a list of texts"),
-    **dict.fromkeys(("types", "versions"), (is_table_of_texts, "a table of texts")),
+    "notes": (validate.are_texts, "a list of texts"),
+    **dict.fromkeys(("types", "versions"), (validate.is_table_of_texts, "a table of texts")),
 }
 
 _HEADER = "checkpoint.json"
@@ -212,7 +204,7 @@ def _header(file: Path, archive: zipfile.ZipFile) -> dict[str, Any]:
             f"cannot resume from {file}: dap3d {made} wrote it in format {header.get('format')}, "
             f"this program reads format {FORMAT}; install that version of dap3d"
         )
-    check_forms(header, KEYS)
+    validate.check_forms(header, KEYS)
     return header
 
 

@@ -24,15 +24,7 @@ from dap3d_core.assembly.arrays import (
 from dap3d_core.assembly.evaluate import call_kinds, place, place_bodies
 from dap3d_core.assembly.state_update import apply_displacement, apply_velocity_change
 from dap3d_core.assembly.turns import begin_turns
-from dap3d_core.formulations.common.constraints import (
-    PART,
-    correct,
-    factorise,
-    linearise,
-    linearise_evenly,
-    residuals,
-    velocity_residuals,
-)
+from dap3d_core.formulations.common import constraints
 from dap3d_core.formulations.joint.equations import body_state
 from dap3d_core.formulations.joint.place import place_tree
 from dap3d_core.formulations.pivots import REDUNDANT
@@ -149,11 +141,11 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
     out[OPEN], out[PASSES] = 1.0, 0.0
     place(t, y, system, loops)
     store_function_values(system)  # joints that are driven begin with those of this run
-    worst = residuals(t, system, loops)
-    linearise(t, system, loops)
-    out[C_BEFORE], out[V_BEFORE] = worst, velocity_residuals(system)
+    worst = constraints.residuals(t, system, loops)
+    constraints.linearise(t, system, loops)
+    out[C_BEFORE], out[V_BEFORE] = worst, constraints.velocity_residuals(system)
     for passes in range(MOST_PASSES + 1):
-        worst = residuals(t, system, loops)
+        worst = constraints.residuals(t, system, loops)
         stalls = worst > 0.5 * before and worst <= FIT * min(length, size)
         if worst <= TOLERANCE * length or stalls:
             out[OPEN] = 0.0
@@ -170,10 +162,10 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
         put_back(y, kept)
         place(t, y, system, loops)
     out[C_AFTER] = worst
-    linearise(t, system, loops)
-    factorise(system, None)
+    constraints.linearise(t, system, loops)
+    constraints.factorise(system, None)
     out[LEAST_PIVOT] = least_pivot_fraction(system)
-    if velocity_residuals(system) > 0.0:
+    if constraints.velocity_residuals(system) > 0.0:
         correct_velocities(y, system)
         place_bodies(y, system.body, system.metric)
     elif is_differentiated():
@@ -182,15 +174,15 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
         correct_velocities(y, system)
         put_back(y, kept)
         place_bodies(y, system.body, system.metric)
-    out[V_AFTER] = velocity_residuals(system)
+    out[V_AFTER] = constraints.velocity_residuals(system)
 
 
 @compiled
 def correct_positions(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """One pass of Newton's iteration for the positions of a start."""
-    linearise(t, system, loops)
+    constraints.linearise(t, system, loops)
     factor_positions(system, out[STARTING:])
-    correct(system)
+    constraints.correct(system)
     limit_displacement(system, MOST_SHIFT * out[SIZE] / system.settings[LENGTH])
     apply_displacement(y, system)
     place_with_spin(y, system)
@@ -199,7 +191,7 @@ def correct_positions(t: float, y: Floats, out: Floats, system: System, loops: A
 @compiled_into
 def correct_velocities(y: Floats, system: System) -> None:
     """Correct the velocities of a start by ``residual``."""
-    correct(system)
+    constraints.correct(system)
     apply_velocity_change(y, system.metric, system.change)
 
 
@@ -241,10 +233,10 @@ def store_reference_pivots(t: float, system: System, loops: Any, part: float | N
     for k in range(smallest.shape[0]):
         smallest[k] = 0.0
     if system.settings[EVEN] != 0.0:
-        linearise_evenly(t, system, loops)
+        constraints.linearise_evenly(t, system, loops)
     else:
-        linearise(t, system, loops)
-    factorise(system, part)
+        constraints.linearise(t, system, loops)
+    constraints.factorise(system, part)
     for k in range(nodes.shape[0] - 1):
         size, first, diagonal = nodes[k, 0], nodes[k, 1], nodes[k, 2]
         for i in range(size):
@@ -272,7 +264,7 @@ def begin_standard(t: float, y: Floats, out: Floats, system: System, loops: Any)
 def begin_regularised(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Begin a run of the formulations with regularised factors."""
     place(t, y, system, loops)
-    store_reference_pivots(t, system, loops, PART)
+    store_reference_pivots(t, system, loops, constraints.PART)
     store_start(t, y, system, loops)
 
 

@@ -38,15 +38,8 @@ from dap3d_core.kernels.runtime.cache import compiled, jit_is_on
 from dap3d_core.kernels.runtime.function_lists import LOOP_LIST
 from dap3d_core.kernels.runtime.lanes import lane_count
 from dap3d_core.model.groups import Floats, Integers
-from dap3d_core.study.batch.driver import (
-    ENDED,
-    NO_START,
-    POINT,
-    Points,
-    set_numbers,
-    start,
-    store_run,
-)
+from dap3d_core.study.batch import driver
+from dap3d_core.study.batch.driver import Points
 
 #: Bodies at most: the arrays of lanes, some 12 kB a body, are to fit into the processor's caches.
 MOST_BODIES = 2000
@@ -129,7 +122,7 @@ def load(points: Points, lane_points: LanePoints, k: int, system: System) -> Non
     p = lane_points.point[k]
     if lane_points.loaded[0] != p:
         lane_points.loaded[0] = p
-        set_numbers(points, p, system)
+        driver.set_numbers(points, p, system)
         last = FUNCTION_WIDTH - 1
         for q in range(system.F.shape[0]):
             system.F[q, last] = lane_points.F[FUNCTION_WIDTH * q + last, k]
@@ -145,13 +138,13 @@ def next_step(run: Any, k: int, work: RungeKuttaState) -> int:
     at, lanes.does[k] = points.at, IDLE
     while True:
         if lane_points.point[k] == NONE:
-            p = at[POINT]
+            p = at[driver.POINT]
             if p == points.diagnostics.shape[0]:
                 return 0
-            at[POINT] = p + 1
+            at[driver.POINT] = p + 1
             lane_points.loaded[0] = p  # also where its run does not begin
-            if not start(points, p, work, starting, system, loops):
-                points.diagnostics[p, ENDED] = NO_START
+            if not driver.start(points, p, work, starting, system, loops):
+                points.diagnostics[p, driver.ENDED] = driver.NO_START
                 continue
             set_lane(points, p, lane_points, k, system)
             lane_points.point[k] = p
@@ -160,7 +153,7 @@ def next_step(run: Any, k: int, work: RungeKuttaState) -> int:
             exchange_kept(lane_points, k, system, True)  # it may have taken steps
             lanes.does[k] = TAKES_STEP
             return 1
-        store_run(points, lane_points.point[k], work, starting, system, loops)
+        driver.store_run(points, lane_points.point[k], work, starting, system, loops)
         lane_points.point[k] = NONE
 
 

@@ -279,12 +279,7 @@ class DifferentiatedRun(Run):
         return evaluator.slope(t - back, y - back * evaluator.slope(t, y))
 
     def _slopes_of_jump(
-        self,
-        k: int,
-        put: Callable[[Run], None],
-        rates: Floats,
-        given: Floats,
-        slopes: Floats,
+        self, k: int, put: Callable[[Run], None], rates: Floats, given: Floats, slopes: Floats
     ) -> Floats:
         """(p,) derivatives of the time by which a switch jumps later where parameters differ.
 

@@ -408,9 +408,7 @@ def _declared_fields(to: Drawer, one: ElementGeometry) -> Pieces:
 DRAWINGS: dict[str, Callable[[Drawer, ElementGeometry], Pieces]] = {
     "": _declared_fields,
     "ball": _ball,
-    "block": lambda to, one: [
-        Mark("", "box", one.bodies["i"], ORIGIN, (4.5 * to.unit,) * 3),
-    ],
+    "block": lambda to, one: [Mark("", "box", one.bodies["i"], ORIGIN, (4.5 * to.unit,) * 3)],
     "cross": _cross,
     "hinge": _hinge,
     "link": _link,
@@ -418,8 +416,6 @@ DRAWINGS: dict[str, Callable[[Drawer, ElementGeometry], Pieces]] = {
     "ring": _ring,
     "sleeve": lambda to, one: _on_rail(to, one, "cylinder", 2.2 * to.unit),
     "slider": lambda to, one: _on_rail(to, one, "box", 4.0 * to.unit),
-    "spring": lambda to, one: [
-        Span("", "spring", one.place("i"), one.place("j"), 2.2 * to.unit),
-    ],
+    "spring": lambda to, one: [Span("", "spring", one.place("i"), one.place("j"), 2.2 * to.unit)],
     "wheel": _wheel,
 }
