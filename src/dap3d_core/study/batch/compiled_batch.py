@@ -317,6 +317,7 @@ def start_constants(evaluator: Evaluator, room: int = 0) -> dict[str, Floats]:
     """
     model, first = evaluator.model, initial_state.STARTING
     starting = np.zeros(first + evaluator.plan.row_size + room)
+    starting[initial_state.SIZE] = model.size  # points of a batch have sizes of their own
     starting[first + evaluator.system.row[np.flatnonzero(~model.position_row)]] = 1.0
     return {"unit": np.array([model.length, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0]), "starting": starting}
 

@@ -113,7 +113,8 @@ NOT_CALLED = {
         "formulations.stabilized_index2.jacobian": "bridge_bends move sizes_of",
         "integrators.stepping.output": "report_end",
         "integrators.runge_kutta.step": "is_rounding",
-        "integrators.stepping.event_location": "cut_step has_jumped first_across",
+        "integrators.stepping.event_location": "cut_step is_sample_across put_rates_before",
+        "integrators.stepping.switch_values": "first_across has_jumped",
         "linear.rank.null_space": "solve_each",
         "study.batch.initial_state": "keep put_back",  # of differentiated code
         # of jumps with closed forms: unit/formulations/jumps, unit/simulation/events
