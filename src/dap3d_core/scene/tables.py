@@ -197,7 +197,9 @@ class SceneTables:
     collisions: Collisions | None = None
     animation: Animation = attrs.Factory(Animation)
     simulation: Simulation = attrs.Factory(Simulation)
-    path: Path | None = attrs.field(default=None, eq=False)
+    path: Path | None = attrs.field(
+        default=None, converter=attrs.converters.optional(Path), eq=False
+    )
     faults: list[tuple[Key, Mistake]] = attrs.field(factory=list, eq=False)
     notes: list[str] = attrs.field(factory=list, eq=False)
     included: dict[str, Path] = attrs.field(factory=dict, eq=False)

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -205,3 +206,11 @@ def test_names_with_spaces_and_letters_of_all_scripts_work():
     scene.add_body("Kurbel №1 – links", mass=1.0, Jp=ROUND)
     scene.add_joint("sph", P_i="Kurbel №1 – links.O", P_j="ground.O")
     assert check(scene, dap.load_registry()).joints[0].bodies == (1, 0)
+
+
+def test_the_path_of_a_scene_may_be_text():
+    """Models' own types are looked for beside it."""
+    scene = dap.Scene(name="ball", path="models/ball/scene.toml")
+    assert scene.folder == Path("models/ball")
+    scene.path = "elsewhere/scene.toml"
+    assert scene.folder == Path("elsewhere")
