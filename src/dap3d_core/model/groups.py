@@ -273,7 +273,7 @@ class Grouping:
         for row, instance, member in zip(numbers, instances, members, strict=True):
             layout = instance.type_info.layout
             try:
-                given = {n: self._callable(f) for n, f in self._given(instance).items()}
+                given = {n: self.callable_of(f) for n, f in self._given(instance).items()}
                 constants = _thing(instance).prepare_functions(given)
             except ValueError as error:
                 faults.append((member, str(error)))
@@ -284,7 +284,7 @@ class Grouping:
         if faults:
             raise PrepareError(*faults)
 
-    def _callable(self, function: Instance) -> Callable[[float], Any]:
+    def callable_of(self, function: Instance) -> Callable[[float], Any]:
         """A function of one argument in Python."""
         from dap3d_core.kernels.runtime import loop_support  # what loops call
 

@@ -4,10 +4,14 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+import numpy as np
+
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.kernels import lookup, where
 from dap3d_core.kernels.runtime.source_digest import reached
-from dap3d_core.model.knots import breaks_are_told
+from dap3d_core.model.groups import Grouping
+from dap3d_core.model.knots import breaks_are_told, breaks_of
+from dap3d_core.model.model import ReferencePoses
 from dap3d_core.result import information
 from dap3d_core.scene import Instance, ValidatedScene
 
@@ -18,6 +22,8 @@ LAWS = ("wrench", "energy")
 STATES = ("rate",)
 #: Python's own words for a number with a corner, and that of an angle: it jumps at half a turn.
 CORNERS = ("abs", "min", "max", "atan2")
+#: Distance from a knot, of the largest one; least jump of a curvature, of the largest at SAMPLES.
+NEAR, JUMP, SAMPLES = 1e-7, 1e-3, 33
 
 
 def notes_on_laws(checked: ValidatedScene) -> list[str]:
@@ -48,12 +54,35 @@ def notes_on_laws(checked: ValidatedScene) -> list[str]:
 
 def notes_on_derivatives(checked: ValidatedScene) -> list[str]:
     """Laws with branches or corners at which no step ends: what derivatives of a run are there."""
-    return [
+    found = [
         f"derivatives: {forces} has a law with branches or corners and no switch: where the motion "
         "passes a jump of it, they are wrong from there on; at a corner they are good to a part of "
         "a thousand or so, whatever the tolerance"
         for forces in _without_switch(checked, (*LAWS, *STATES), CORNERS)
     ]
+    return found + [
+        f"derivatives: contacts.{contact.name} rubs along functions.{function.name} "
+        f"({function.type_info.type.keyword}), whose curvature jumps: where it passes that, they "
+        "are wrong from there on; types such as b and spline have none"
+        for contact in checked.contacts
+        if contact.values.get("mu") != 0.0
+        for function in checked.functions
+        if function.name in map(contact.values.get, contact.type_info.argument_functions)
+        and _bends_at_once(checked, function)
+    ]
+
+
+def _bends_at_once(checked: ValidatedScene, function: Instance) -> bool:
+    """True if the second derivative of a function of one argument jumps where it changes form."""
+    type_: Any = function.type_info.type
+    knots = breaks_of(function)
+    if type_.arguments > 1 or not knots.size:
+        return False
+    f = Grouping("function", ReferencePoses(checked), 0, checked.functions).callable_of(function)
+    beside = NEAR * np.max(np.abs(knots))
+    jumps = [abs(f(x + beside)[2] - f(x - beside)[2]) for x in knots]
+    between = [abs(f(x)[2]) for x in np.linspace(knots.min(), knots.max(), SAMPLES)]
+    return bool(max(jumps) > JUMP * max(between))
 
 
 def _without_switch(

@@ -285,6 +285,15 @@ def test_what_derivatives_mean_is_noted():
     assert "forces.spring (rot_sda) has a law with branches" in note  # it jumps at half a turn
     scene.forces["spring"].fields["turns"] = True
     assert not notes(scene, "forces.spring.k")
+    scene = dap.Scene(name="slide")
+    scene.add_body("block", mass=1.0, Jp=(1.0, 1.0, 1.0), r_dot=(1.5, 0.0, 0.0))
+    scene.add_force("weight", "g", wgt=(0.0, -1.0, 0.0))
+    scene.add_function("step", "f", x_start=0.4, x_end=1.0, f_end=-0.2)
+    scene.add_contact("point_curve", "way", P_i="block.O", function="f", mu=0.2)
+    (note,) = notes(scene, "bodies.block.mass")
+    assert "contacts.way rubs along functions.f (step), whose curvature jumps" in note
+    scene.functions["f"].type = "b"
+    assert not notes(scene, "bodies.block.mass")
 
 
 def test_a_vector_has_no_elasticity():
