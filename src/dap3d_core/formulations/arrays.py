@@ -24,6 +24,7 @@ from dap3d_core.kernels.runtime.function_lists import loop_list
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P
 from dap3d_core.linear.ldlt.plan import Plan
 from dap3d_core.model import Group, Model
+from dap3d_core.model.scales import moments_of
 
 #: Usual alpha, Omega (1/s), mu of the penalty formulation.
 PENALTY = (1e7, 10.0, 1.0)
@@ -87,7 +88,7 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
     set_metric(metric, model.mass, model.Jp)
     idx, par, groups, starts = _tables(model, plan, what)
     turns, counted = turn_tables(model, len(par))
-    even, weak = mass_flags(model.mass, model.Jp, model.part_size)
+    even, weak = mass_flags(model.mass, moments_of(model.Jp), model.part_size)
     return System(
         body=body,
         metric=metric,
@@ -222,7 +223,8 @@ def load_numbers(
     system.body[1:, JP : JP + 9] = other.Jp.reshape(-1, 9)
     set_metric(system.metric, other.mass, other.Jp)
     system.settings[LENGTH] = other.length
-    system.settings[[EVEN, WEAK]] = mass_flags(other.mass, other.Jp, other.part_size)
+    flags = mass_flags(other.mass, moments_of(other.Jp), other.part_size)
+    system.settings[[EVEN, WEAK]] = flags
     return regrouped(model, other, what)
 
 
@@ -254,14 +256,15 @@ def _all_groups(model: Model) -> tuple[Group, ...]:
     return (*model.functions, *model.forces, *model.joints, *model.friction)
 
 
-def mass_flags(mass: Floats, Jp: Floats, size: Floats | float) -> Floats:
-    """(..., 2) EVEN and WEAK of masses (..., n) and inertia matrices (..., n, 3, 3), 1.0 or 0.0.
+def mass_flags(mass: Floats, moments: Floats, size: Floats | float) -> Floats:
+    """(..., 2) EVEN and WEAK of masses (..., n) and moments of inertia (..., n, 3), 1.0 or 0.0.
 
     EVEN: a pivot would tell of the masses and not of the pose (UNEVEN); WEAK: masses and moments of
     inertia, over the square of ``size`` (...) of the largest part, m, may make rows weak
     (VERY_UNEVEN).
     """
-    moments = np.linalg.eigvalsh(Jp) / np.square(size)[..., None, None]
+    moments = moments / np.square(size)[..., None, None]
+    mass = np.broadcast_to(mass, moments.shape[:-1])
     every = np.concatenate([mass[..., None], moments], axis=-1)
     every = every.reshape(*every.shape[:-2], every.shape[-2] * every.shape[-1])
     of_masses, of_all = (

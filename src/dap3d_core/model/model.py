@@ -17,7 +17,7 @@ from dap3d_core.interface.types import BodyPose, pose
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers, PrepareError
 from dap3d_core.model.joint_angles import JointAngles, joint_angle_name
 from dap3d_core.model.rotations import read_only
-from dap3d_core.model.scales import ORDINARY, Scales, scales_of
+from dap3d_core.model.scales import ORDINARY, Scales, gyrations_of, scales_of
 from dap3d_core.model.state_layout import (
     COORDINATES,
     VELOCITIES,
@@ -258,7 +258,8 @@ class Model(Bodies):
     @cached_property
     def scales(self) -> Scales:
         """Lengths of the model, m."""
-        return scales_of(self.mass, self.Jp, self.r, self.p, self.point_body, self.point_local)
+        gyrations = gyrations_of(self.mass, self.Jp)
+        return scales_of(gyrations, self.r, self.p, self.point_body, self.point_local)
 
     @property
     def size(self) -> float:

@@ -32,13 +32,25 @@ class Scales(NamedTuple):
     arm: Floats
 
 
+def moments_of(Jp: Floats) -> Floats:
+    """Principal moments of inertia (..., 3), in order, of matrices (..., 3, 3)."""
+    return np.asarray(np.linalg.eigvalsh(Jp), dtype=np.float64)
+
+
+def gyrations_of(mass: Floats, Jp: Floats) -> Floats:
+    """Radii of gyration (..., n), m, of bodies with masses (..., n), inertias (..., n, 3, 3)."""
+    found: Floats = np.sqrt(np.linalg.norm(Jp, ord=2, axis=(-2, -1)) / mass)
+    return found
+
+
 def scales_of(
-    mass: Floats, Jp: Floats, r: Floats, p: Floats, point_body: Integers, point_local: Floats
+    gyrations: Floats, r: Floats, p: Floats, point_body: Integers, point_local: Floats
 ) -> Scales:
-    """Scales of scenes (...) with n bodies.
+    """Scales of scenes (...) with n bodies; arguments that are the same for all have no (...).
 
     Args:
-        mass, Jp, r: (..., n), (..., n, 3, 3), (..., n, 3) of the bodies.
+        gyrations: (..., n) radii of gyration of the bodies.
+        r: (..., n, 3) of the bodies.
         p: (n, 4) their Euler parameters.
         point_body: (points,) body of each point, ground 0.
         point_local: (..., points, 3) in axes of the bodies.
@@ -48,10 +60,10 @@ def scales_of(
     poses = np.vstack([[1.0, 0.0, 0.0, 0.0], p])[point_body]
     points = np.concatenate([r, places + to_global(poses, point_local)], axis=-2)
     reach = np.max(np.abs(np.concatenate([r, point_local], axis=-2)), axis=(-2, -1), initial=0.0)
-    if not mass.shape[-1]:
+    if not gyrations.shape[-1]:
         one, none = np.ones(reach.shape), np.zeros(reach.shape)
         return Scales(np.where(reach > 0.0, reach, one), one, one, none, none, none)
-    gyration = np.sqrt(np.max(np.linalg.norm(Jp, ord=2, axis=(-2, -1)) / mass, axis=-1))
+    gyration = np.max(gyrations, axis=-1)
     extent = np.linalg.norm(np.max(points, axis=-2) - np.min(points, axis=-2), axis=-1)
     extent = np.where(extent > EXTENT * np.max(np.abs(points), axis=(-2, -1)), extent, gyration)
     arms = np.linalg.norm(point_local[..., point_body > 0, :], axis=-1)

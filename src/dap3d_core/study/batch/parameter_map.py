@@ -26,7 +26,7 @@ from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS
 from dap3d_core.model import Group
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.model import ReferencePoses
-from dap3d_core.model.scales import Scales, scales_of
+from dap3d_core.model.scales import Scales, gyrations_of, moments_of, scales_of
 from dap3d_core.model.state_layout import join, split, u_from_y, y_from_u
 from dap3d_core.scene import Instance, ValidatedScene
 from dap3d_core.scene.validate.bodies import SMALLEST_INERTIA, ZERO_INERTIA
@@ -117,10 +117,13 @@ class ParameterMap:
         system, n = evaluator.system, 1 + self._bodies[:, None]
         if any(group.type_info.layout.unknowns for group in evaluator.model.joints):
             raise NotCopiedError  # their unknowns are sought anew for each point
-        self._changes_scales = any(
-            p.table == "points" or (p.table == "bodies" and p.path[2] in ("mass", "Jp", "r"))
-            for p in parameters
+        self._moves_parts = any(
+            p.table == "points" or (p.table == "bodies" and p.path[2] == "r") for p in parameters
         )
+        self._changes_scales = self._moves_parts or len(self._bodies) > 0
+        #: Masses (n,), moments of inertia (n, 3) and radii of gyration (n,) of the scene.
+        mass, Jp = checked.mass, checked.Jp
+        self._of_scene = mass, moments_of(Jp), gyrations_of(mass, Jp)
         counters = np.r_[0:0, *evaluator.turn_places()]  # zero at the start of each run
         self._counters = len(counters)
         body = system.par.size + n * BODY_WIDTH
@@ -156,7 +159,7 @@ class ParameterMap:
             valid &= parameter.is_valid(value)
             parts.append(np.repeat(value[:, None], len(parameter.targets), axis=1))
         if len(self._bodies):
-            mass, Jp, fine = self._inertias(values)
+            mass, Jp, _, fine = self._inertias(values)
             valid &= fine
             if is_checked:
                 mass[~fine], Jp[~fine] = (
@@ -174,9 +177,8 @@ class ParameterMap:
 
     def sizes(self, values: Floats) -> Floats:
         """(k,) ``Model.size`` of points."""
-        if not self._changes_scales:
-            return np.full(len(values), self._evaluator.model.size)
-        return self._scales(*self._bodies_of(values), values).size
+        *_, gyrations = self._of_bodies(values)
+        return np.broadcast_to(self._scales(gyrations, values).size, len(values))
 
     def states(self, values: Floats, u0: Floats) -> Floats:
         """Integrated states (k, ...) to start from; u0 (13 n,) is that of the scene."""
@@ -216,8 +218,6 @@ class ParameterMap:
 
         u = u_from_y(y0, evaluator.model.state_count)
         return are_undefined(evaluator.model, u, numbers_of, float(np.max(sizes, initial=0.0)))
-
-    # ------------------------------------------------------------------ one parameter
 
     def _mapped(self, parameter: SceneParameter) -> MappedParameter:
         table = parameter.table
@@ -299,8 +299,6 @@ class ParameterMap:
         type_: Any = function.type_info.type
         return not called and type_.breaks is Function.breaks
 
-    # ------------------------------------------------------------------ entries of elements
-
     def _reads(self, instance: Instance) -> "_Dependence":
         key = id(instance)
         if key not in self._dependence:
@@ -343,8 +341,8 @@ class ParameterMap:
                 seen.add(id(group))
                 yield group, int(self._evaluator.system.groups[q, 1])
 
-    def _inertias(self, values: Floats) -> tuple[Floats, Floats, Booleans]:
-        """Masses (k, b), inertia matrices (k, b, 3, 3) of bodies that vary; (k,) True if valid."""
+    def _inertias(self, values: Floats) -> tuple[Floats, Floats, Floats, Booleans]:
+        """Masses (k, b), inertia matrices, moments (k, b, 3) that vary; (k,) True if valid."""
         checked, count = self._checked, len(values)
         mass = np.repeat(checked.mass[self._bodies][None], count, axis=0)
         Jp = np.repeat(checked.Jp[self._bodies][None], count, axis=0)
@@ -357,41 +355,43 @@ class ParameterMap:
                 else:
                     Jp[:, b, index[0], index[0]] = value
         valid = np.all((mass >= SMALLEST_INERTIA) & (mass <= LARGEST), axis=1)
-        least, middle, most = np.linalg.eigvalsh(np.where(np.abs(Jp) <= LARGEST, Jp, 0.0)).T
+        moments = moments_of(np.where(np.abs(Jp) <= LARGEST, Jp, 0.0))
+        least, middle, most = moments.T
         sound = (least > ZERO_INERTIA * most) & (most >= SMALLEST_INERTIA)
         valid &= np.all(sound & (most <= least + middle), axis=0)
-        return mass, Jp, valid
+        return mass, Jp, moments, valid
 
-    def _bodies_of(self, values: Floats) -> tuple[Floats, Floats]:
-        """Masses (k, n) and inertia matrices (k, n, 3, 3) of all bodies, if they are valid."""
-        every = self._checked.mass, self._checked.Jp
-        mass, Jp = (np.repeat(of[None], len(values), axis=0) for of in every)
-        if len(self._bodies):
-            *of_bodies, valid = self._inertias(values)
-            at = np.ix_(valid, self._bodies)
-            mass[at], Jp[at] = (own[valid] for own in of_bodies)
-        return mass, Jp
+    def _of_bodies(self, values: Floats) -> tuple[Floats, ...]:
+        """As ``_of_scene`` with a first axis (k,), where they vary and are valid."""
+        if not len(self._bodies):
+            return self._of_scene
+        mass, Jp, moments, valid = self._inertias(values)
+        mass, Jp, moments = mass[valid], Jp[valid], moments[valid]
+        every = tuple(np.repeat(of[None], len(values), axis=0) for of in self._of_scene)
+        for of, own in zip(every, (mass, moments, gyrations_of(mass, Jp)), strict=True):
+            of[np.ix_(valid, self._bodies)] = own
+        return every
 
-    def _scales(self, mass: Floats, Jp: Floats, values: Floats) -> Scales:
-        """Scales (k,) of points, with bodies as of ``_bodies_of``."""
-        checked = self._checked
-        every = checked.r, checked.point_local
-        r, local = (np.repeat(of[None], len(values), axis=0) for of in every)
+    def _scales(self, gyrations: Floats, values: Floats) -> Scales:
+        """Scales of points whose bodies have these radii of gyration."""
+        checked, r, local = self._checked, self._checked.r, self._checked.point_local
+        if self._moves_parts:
+            r, local = (np.repeat(of[None], len(values), axis=0) for of in (r, local))
         for parameter, value in zip(self.parameters, values.T, strict=True):
             table, name, field = (*parameter.path, "", "")[:3]
             if table == "points":
                 local[:, checked.point_names.index(name), parameter.index[0]] = value
             elif (table, field) == ("bodies", "r"):
                 r[:, checked.body_index[name] - 1, parameter.index[0]] = value
-        return scales_of(mass, Jp, r, checked.p, checked.point_body, local)
+        return scales_of(gyrations, r, checked.p, checked.point_body, local)
 
     def _has_scales_of_scene(self, values: Floats) -> Booleans:
         """(k,) True where tolerances and flags of masses are those of the scene."""
         model = self._evaluator.model
-        mass, Jp = self._bodies_of(values)
-        scales = self._scales(mass, Jp, values)
-        own = mass_flags(model.mass, model.Jp, model.part_size)
-        is_same = np.all(mass_flags(mass, Jp, scales.part_size) == own, axis=-1)
+        mass, moments, gyrations = self._of_bodies(values)
+        scales = self._scales(gyrations, values)
+        own = mass_flags(*self._of_scene[:2], model.part_size)
+        is_same = np.all(mass_flags(mass, moments, scales.part_size) == own, axis=-1)
         is_same &= scales.exponent == model.scales.exponent
         tree = self._evaluator.system.tree
         if tree is not None and np.any(tree.nodes[:, node.MOTION] == node.PRISMATIC):
