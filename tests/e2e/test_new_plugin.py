@@ -56,6 +56,7 @@ def test_the_package_is_complete(kind, tmp_path):
         assert "$" not in (folder / name).read_text(), name
 
 
+@pytest.mark.slow
 def test_the_badge_shows_what_check_plugin_says(tmp_path):
     """Its words and its colour are those of the JSON: right, wrong, and a check that broke off."""
     new_plugin(tmp_path, "mine", "--kind", "force")

@@ -128,7 +128,8 @@ def test_by_the_direction_of_an_axis_whose_normals_jump():
     assert s.of("block.r")[..., 0] == pytest.approx(derivative(place, 0.32), abs=1e-9)
 
 
-@pytest.mark.parametrize("method", ["joint", "standard"])
+@pytest.mark.every(2)
+@pytest.mark.parametrize("method", ["standard", "joint"])
 def test_a_pendulum_at_rest_that_is_pulled_ever_more(method):
     """By its rate at the start: q'' = -(a + b t) q, whose solutions are Airy's functions. Values of
     radau's stages are right at once; their derivatives take passes of their own."""

@@ -96,6 +96,7 @@ def test_a_state_of_an_element_has_the_bits_of_a_result(tmp_path):
     assert run["damper.z"] == expected > 0.1
 
 
+@pytest.mark.slow
 def test_contacts_have_derivatives_of_what_the_state_gives(tmp_path):
     """The gap of a ball above a plane is its height, and slip at its foot that of its centre."""
     outputs = ["floor_a.gap", "floor_b.gap", "floor_b.slip.x", "floor_b.mode"]

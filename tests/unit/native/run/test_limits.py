@@ -71,6 +71,7 @@ def test_of_two_in_order_one_is_under_the_other(tmp_path):
     assert found[1].words == ["should be less than functions.push.x_end"]
 
 
+@pytest.mark.slow
 def test_one_that_is_in_two_orders(tmp_path, monkeypatch):
     """Coefficients of two floors above a shared one, in any order of names, and times in a row."""
     scene, accept, known = two_floors(), _Trials.accept, {}

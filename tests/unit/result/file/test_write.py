@@ -219,6 +219,7 @@ def test_a_folder_without_permission(tmp_path):
         tmp_path.chmod(0o700)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(signal, "SIGXFSZ"), reason="no limits of file size here")
 def test_a_full_disk(tmp_path):
     """The system refuses to write more than 50 kB to a file: the message names that of the user."""

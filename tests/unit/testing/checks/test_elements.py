@@ -178,7 +178,7 @@ def beside(r_P_i, a_j, radius):
     return add(r_P_i, scale(radius, cross(a_j, (0.6, 0.0, 0.8))))
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     ("planted", "found"),
     [
