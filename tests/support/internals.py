@@ -103,7 +103,7 @@ from dap3d_core.kernels.runtime.loop_modules import (
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P, unwound
 from dap3d_core.linear.ldlt.factor import add_product, assemble, factor, scale_blocks, solve_saddle
 from dap3d_core.linear.ldlt.plan import make_plan
-from dap3d_core.linear.rank import rank
+from dap3d_core.linear import rank
 from dap3d_core.model.rigid_motion import (
     Pose,
     adjoint,

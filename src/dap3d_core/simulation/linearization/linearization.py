@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.linear.rank.rank import Dependency
+from dap3d_core.linear.rank import Dependency
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result, information
 from dap3d_core.scene import Scene

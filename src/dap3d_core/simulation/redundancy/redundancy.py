@@ -9,7 +9,7 @@ import numpy as np
 from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.linear.rank.rank import FEW_ROWS, WEIGHT, Dependency, Rank, dense_rank, sparse_rank
+from dap3d_core.linear.rank import FEW_ROWS, WEIGHT, Dependency, Rank, dense_rank, sparse_rank
 from dap3d_core.model import Model
 from dap3d_core.registry.suggestions import some
 from dap3d_core.simulation.initial.assemble import fit_of
