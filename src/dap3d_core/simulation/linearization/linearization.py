@@ -14,17 +14,17 @@ from dap3d_core.result import Result, information
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
-from dap3d_core.simulation.linearization.eigenvalues import (
-    Complex,
-    Eigenvalues,
-    eigenvalues_of,
-    order_of,
-)
-from dap3d_core.simulation.linearization.frequency_response import response
 from dap3d_core.simulation.linearization.inputs import inputs_of, output_derivatives
 from dap3d_core.simulation.linearization.mode_motion import mode_motion
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint, operating_point
 from dap3d_core.simulation.linearization.scaled_equations import ScaledEquations
+from dap3d_core.simulation.linearization.state_matrices import (
+    Complex,
+    Eigenvalues,
+    eigenvalues_of,
+    order_of,
+    response,
+)
 from dap3d_core.simulation.linearization.state_space import DriverRows, StateSpace, state_space
 from dap3d_core.simulation.linearization.steady_motion import independent_rows
 
