@@ -9,7 +9,7 @@ import numpy as np
 from dap3d_core.assembly.arrays import Floats
 from dap3d_core.assembly.motion.classify import classify_group
 from dap3d_core.assembly.motion.joint_motion import BALL, TRANSLATION, JointMotions, Part
-from dap3d_core.assembly.motion.refusals import NOT_CLOSED, ON_TIME, refusal_of, refused_joints
+from dap3d_core.assembly.motion.joint_rows import NOT_CLOSED, ON_TIME, refusal_of, refused_joints
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.model import Group
