@@ -10,10 +10,10 @@ of a box or a cylinder, that is known at once.
 
 import math
 
-from dap3d_core.assembly.collisions.boxes import dot_axis
 from dap3d_core.assembly.collisions.distance import APART, FAR_APART, A, B, V, dot, nearest
 from dap3d_core.assembly.collisions.manifold import E1, E2, put_points, tangents
 from dap3d_core.assembly.collisions.placed_shapes import PlacedShapes
+from dap3d_core.assembly.collisions.solids import dot_axis
 from dap3d_core.assembly.collisions.supports import FLAT, curvature, extent_of, radius_of, support
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled

@@ -4,9 +4,9 @@ Pairs that may touch come from a grid of cells, and of the few larger shapes one
 """
 
 from dap3d_core.assembly.collisions import solids
-from dap3d_core.assembly.collisions.boxes import boxes
 from dap3d_core.assembly.collisions.convex import touch_convex
 from dap3d_core.assembly.collisions.placed_shapes import PlacedShapes, place_shapes
+from dap3d_core.assembly.collisions.solids import boxes
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.scene.contacts.collision_shapes import (
