@@ -21,7 +21,7 @@ from dap3d_core.testing.checks.findings import (
     Report,
     TypeMotion,
 )
-from dap3d_core.testing.checks.motion import motion_of_type
+from dap3d_core.testing.checks.joints import motion_of_type
 from dap3d_core.testing.samples.sampled_type import SampledType, UndefinedError, sampled_types
 
 #: Default number of random poses on and off the manifold, and their seed.
