@@ -61,7 +61,6 @@ def at_plane(shapes: PlacedShapes, count: int, i: int, j: int) -> int:
     return count
 
 
-
 @compiled
 def balls(
     shapes: PlacedShapes, count: int, i: int, j: int, feature: int, x: float, y: float, z: float,

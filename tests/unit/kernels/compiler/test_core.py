@@ -99,7 +99,7 @@ NOT_CALLED = {
     for module, names in {
         "formulations.common.constraints": "linearise_evenly",
         "formulations.standard": "settle_rows",
-        "integrators.adams.step": "reject",
+        "integrators.adams": "reject",
         "integrators.stepping.vector_ops": "scaled_beyond",
         "integrators.runge_kutta.sums": "combine_by_table error_beyond_rounding",
         "integrators.stepping.singular_poses": "predict_measures is_approaching "
