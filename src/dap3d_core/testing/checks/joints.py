@@ -23,8 +23,8 @@ from dap3d_core.testing.checks.compare import (
     body_words,
     rates,
 )
+from dap3d_core.testing.checks.elements import rigid_motion
 from dap3d_core.testing.checks.findings import CheckOutcome, TypeMotion
-from dap3d_core.testing.checks.forces import rigid_motion
 from dap3d_core.testing.samples.random_element import RandomElement, RefusalError, draw
 from dap3d_core.testing.samples.random_state import Direction, State, random_state
 from dap3d_core.testing.samples.sampled_type import (
