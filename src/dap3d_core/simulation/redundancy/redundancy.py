@@ -74,11 +74,6 @@ class ReactionUniqueness:
     force: str
     moment: str
 
-    @property
-    def partly(self) -> bool:
-        """True if some component is unique."""
-        return bool(self.unique_rows or self.force or self.moment)
-
     def describe(self) -> str:
         """Text on the unique components."""
         parts = {"force": self.force, "moment": self.moment}
