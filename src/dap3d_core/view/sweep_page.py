@@ -15,7 +15,7 @@ from dap3d_core.simulation import CompiledModel, SimulationError, simulate
 from dap3d_core.simulation.output.type_sources import digests_of
 from dap3d_core.study import REDUCTIONS, PointStatus, SceneParameter, parameters_named, with_values
 from dap3d_core.study.sweep.dataset import at_places, evenly, varied_of
-from dap3d_core.view.page import page_data
+from dap3d_core.view.page_data import page_data
 from dap3d_core.view.scene3d.sampled_motion import Extent, stage
 
 if TYPE_CHECKING:
