@@ -6,7 +6,7 @@ from typing import Any
 
 from dap3d_core.interface.formats import Exporter, ResultExporter, hookimpl
 from dap3d_core.result.quantities.csv_table import columns_of, write_csv
-from dap3d_core.result.quantities.datasets import why_no_reactions
+from dap3d_core.result.quantities.netcdf_export import why_no_reactions
 
 interface_version = 1
 

@@ -9,7 +9,7 @@ import numpy as np
 from dap3d_core.interface.formats import Exporter, ResultExporter, hookimpl
 from dap3d_core.result import Result, ResultError
 from dap3d_core.result.file.atomic_write import cannot
-from dap3d_core.result.quantities.datasets import dataset_to_write, why_no_reactions
+from dap3d_core.result.quantities.netcdf_export import dataset_to_write, why_no_reactions
 
 Progress = Callable[[int, int], None]
 

@@ -133,8 +133,8 @@ from dap3d_core.result.file import checksum
 from dap3d_core.result.post.smooth_parts import smooth_parts
 from dap3d_core.result.quantities.catalogue import QUANTITIES, SYSTEM
 from dap3d_core.result.quantities.csv_table import columns_of, jacobian_columns, selected, write_csv
-from dap3d_core.result.quantities.datasets import dataset_to_write, selection_of, write_netcdf
 from dap3d_core.result.quantities.lookup import COORDINATE
+from dap3d_core.result.quantities.netcdf_export import dataset_to_write, selection_of, write_netcdf
 from dap3d_core.scene.expressions.expression import (
     DEEPEST,
     LONGEST,

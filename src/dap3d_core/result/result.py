@@ -472,7 +472,7 @@ class Result(ResultDisplay, ResultContacts):
 
     def to_xarray(self) -> "xarray.Dataset":
         """All arrays and outputs with named dimensions and units, as an xarray.Dataset."""
-        from dap3d_core.result.quantities.datasets import add_outputs, dataset_of
+        from dap3d_core.result.quantities.xarray_dataset import add_outputs, dataset_of
 
         return add_outputs(dataset_of(self), self)
 

@@ -61,7 +61,7 @@ def post(
     """
     from dap3d_core.cli.console.console import show_written
     from dap3d_core.cli.framework.paths import open_result, refuse_all, writable
-    from dap3d_core.result.quantities.datasets import why_no_reactions
+    from dap3d_core.result.quantities.netcdf_export import why_no_reactions
 
     target, kind = _target(result, output, kind)
     opened = open_result(result, model=model, allow_code=allow_code)
@@ -131,7 +131,7 @@ def _write_arrays(
 ) -> list[dict[str, Any]]:
     """Write a NetCDF file; returns its arrays."""
     from dap3d_core.result import ResultError, UnknownNameError
-    from dap3d_core.result.quantities.datasets import (
+    from dap3d_core.result.quantities.netcdf_export import (
         dataset_to_write,
         selection_of,
         write_netcdf,

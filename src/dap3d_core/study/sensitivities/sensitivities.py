@@ -194,7 +194,7 @@ class Sensitivities:
         Raises:
             ResultError: the file cannot be written, or exists and ``force`` is off.
         """
-        from dap3d_core.result.quantities.datasets import write_dataset
+        from dap3d_core.result.quantities.netcdf_export import write_dataset
 
         write_dataset(self.to_xarray(quantities), Path(path), force=force)
 

@@ -14,7 +14,7 @@ from dap3d_core.result import ResultError
 
 
 def test_a_jacobian_of_many_rows_is_written_by_its_entries(tmp_path, monkeypatch):
-    monkeypatch.setattr("dap3d_core.result.quantities.datasets.DENSE_ROWS", 2)
+    monkeypatch.setattr("dap3d_core.result.quantities.netcdf_export.DENSE_ROWS", 2)
     result, _, _ = circling(nt=4)
     file = tmp_path / "all.nc"
     arrays = write_netcdf(result, file, dataset_to_write(result), jacobian=True, force=False)
@@ -42,7 +42,7 @@ def test_a_file_that_cannot_be_finished_leaves_nothing(tmp_path, monkeypatch):
     def full(*_, **__):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("dap3d_core.result.quantities.datasets._add_jacobian", full)
+    monkeypatch.setattr("dap3d_core.result.quantities.netcdf_export._add_jacobian", full)
     with pytest.raises(ResultError, match=r"cannot write .*all\.nc: No space left"):
         write_netcdf(result, tmp_path / "all.nc", dataset, jacobian=True, force=False)
     monkeypatch.setattr("dap3d_core.result.quantities.csv_table._write", full)
