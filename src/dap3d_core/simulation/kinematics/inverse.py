@@ -19,8 +19,6 @@ from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError, refuse_collisions
 from dap3d_core.simulation.failure.monitors import UnilateralMonitor
-from dap3d_core.simulation.kinematics.actuators import Actuator, DriverActuator, actuators_of
-from dap3d_core.simulation.kinematics.closed_contacts import Closed, ContactForces
 from dap3d_core.simulation.kinematics.kinematics import check_output
 from dap3d_core.simulation.kinematics.motion_data import (
     Motion,
@@ -33,6 +31,13 @@ from dap3d_core.simulation.kinematics.pose_equations import (
     Flags,
     held_states,
     required_forces,
+)
+from dap3d_core.simulation.kinematics.unknown_forces import (
+    Actuator,
+    Closed,
+    ContactForces,
+    DriverActuator,
+    actuators_of,
 )
 from dap3d_core.simulation.redundancy.freedoms import motion_words
 from dap3d_core.simulation.redundancy.shared_reactions import refuse_shared, shared_laws

@@ -13,7 +13,7 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.interface.codegen.reactions import reaction_names
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.linear.rank.rank import Rank, dense_rank
+from dap3d_core.linear.rank import Rank, dense_rank
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import join
 from dap3d_core.result import Result, information

@@ -9,7 +9,7 @@ import numpy as np
 from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.linear.rank.rank import FEW_ROWS, WEIGHT, Dependency, Rank, dense_rank, sparse_rank
+from dap3d_core.linear.rank import FEW_ROWS, WEIGHT, Dependency, Rank, dense_rank, sparse_rank
 from dap3d_core.model import Model
 from dap3d_core.registry.suggestions import some
 from dap3d_core.simulation.initial.assemble import fit_of
@@ -73,11 +73,6 @@ class ReactionUniqueness:
     unique_rows: tuple[int, ...]
     force: str
     moment: str
-
-    @property
-    def partly(self) -> bool:
-        """True if some component is unique."""
-        return bool(self.unique_rows or self.force or self.moment)
 
     def describe(self) -> str:
         """Text on the unique components."""

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from support.command_line import lines_of
-from unit.simulation.linearization.test_frequency_response import exact, masses
+from unit.simulation.linearization.test_state_matrices import exact, masses
 
 from dap3d_core.cli import main
 
