@@ -109,7 +109,8 @@ def time_of(model: "Model", forces: Callable[[float], Floats]) -> float:
 
     rate = fastest(0.0)
     if not rate > 1.0 / LONGEST:
-        rate = next((1.0 / t for t in LATER if fastest(t) * t >= 1.0), 1.0)
+        later = LATER if model.functions else ()
+        rate = next((1.0 / t for t in later if fastest(t) * t >= 1.0), 1.0)
     least = ORDINARY[0] if model.length != 1.0 else 0.0
     if not 1.0 / LONGEST < rate < LONGEST or least <= 1.0 / rate <= ORDINARY[1]:
         return 1.0
