@@ -19,7 +19,7 @@ WIDEST = 1e20
 #: Times beyond are no scale of a motion, s.
 LONGEST = 1e12
 #: Instants, s, at which forces may show that do not act at first.
-LATER = tuple(10.0**k for k in range(-6, 7))
+LATER = tuple(10.0**k for k in range(-9, 10))
 #: Points nearer than this part of their distance from the origin are one but for rounding.
 EXTENT = 1e-12
 
