@@ -45,7 +45,6 @@ from dap3d_core.interface.element_states import START
 from dap3d_core.linear.ldlt.plan import Plan, make_plan
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import to_body
-from dap3d_core.model.scales import time_of
 from dap3d_core.model.state_layout import bodies_of, split, u_from_y, velocities_of, y_from_u
 
 #: Plain Python divides by zero without a warning, as compiled code does: NaN is looked for after.
@@ -62,7 +61,7 @@ class Evaluator:
         formulation: its properties.
         report_size: numbers that ``report`` writes (formulations/standard.py).
         states: (states,) of elements, in evaluations at a state u of the bodies alone.
-        time: s, that tolerances speak of (model/scales.py).
+        time: s, that tolerances speak of (``Model.time``).
     """
 
     model: Model
@@ -432,7 +431,7 @@ class Evaluator:
         """
         model = self.model
         self.system.weight[:] = 1.0
-        self.time = time_of(model, lambda t: self.applied_forces(t, model.u0))
+        self.time = model.time(lambda t: self.applied_forces(t, model.u0))
         self._weigh_forces()
         if model.length != 1.0 and model.row_count:
             gradients = scaled_rows(self.rows(0.0, model.u0), model.length)[1]

@@ -1,16 +1,11 @@
 """Sizes of a scene, of one or of many that differ in their numbers."""
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.model.rotations import to_global
-from dap3d_core.model.state_layout import split
-
-if TYPE_CHECKING:
-    from dap3d_core.model.model import Model
 
 #: Sizes, m, and times, s, of ordinary scenes: their tolerances are in metres and seconds.
 ORDINARY = 0.03, 30.0
@@ -83,35 +78,3 @@ def scales_of(
     exponent = np.asarray(np.round(np.log10(np.where(is_ordinary, 1.0, part_size))), dtype=float)
     size = np.where(reach > 0.0, reach, extent)
     return Scales(size, extent, part_size, exponent, gyration, arm)
-
-
-def time_of(model: "Model", forces: Callable[[float], Floats]) -> float:
-    """The time, s, that tolerances speak of: a power of ten, 1 of ordinary scenes.
-
-    In that time the start would change by as much as the size of the parts: by its velocities, and
-    by what forces do to bodies without joints, which may hold all at first; where nothing moves so,
-    by forces that act later. Motions of a scene of ordinary size that are quicker than ordinary
-    need no other limits.
-
-    Args:
-        model: its state is that at the start.
-        forces: gives (n, 6) force and moment on each body, there, at a time, s.
-    """
-    of_turning = np.linalg.norm(model.Jp, ord=2, axis=(-2, -1))[:, None]
-    _, _, v, w = split(model.u0)
-
-    def fastest(t: float) -> float:
-        wrench = forces(t)
-        moving = np.array([v, wrench[:, :3] / model.mass[:, None]]) / model.part_size
-        turning = np.array([w, wrench[:, 3:] / of_turning])
-        rates = np.linalg.norm([moving, turning], axis=-1).max(axis=(0, -1), initial=0.0)
-        return float(max(rates[0], np.sqrt(rates[1])))
-
-    rate = fastest(0.0)
-    if not rate > 1.0 / LONGEST:
-        later = LATER if model.functions else ()
-        rate = next((1.0 / t for t in later if fastest(t) * t >= 1.0), 1.0)
-    least = ORDINARY[0] if model.length != 1.0 else 0.0
-    if not 1.0 / LONGEST < rate < LONGEST or least <= 1.0 / rate <= ORDINARY[1]:
-        return 1.0
-    return float(10.0 ** -np.round(np.log10(rate)))

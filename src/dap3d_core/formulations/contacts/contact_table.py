@@ -103,8 +103,7 @@ class ContactTable:
             values=np.zeros(max(sizes, default=0)), place=np.zeros(1),
         )  # fmt: skip
         self.length = np.where(self.turns > 0.0, 1.0, model.length)
-        self.arm = model.length / self.length
-        self.speed = self.length / evaluator.time
+        self.arm, self.speed = model.length / self.length, self.length / evaluator.time
         reach = np.where(self.turns > 0.0, model.length, model.reach)
         self.rounding = POSITION_ROUNDING * reach
         self.gapless = (self.alone & self.holds[:, 0]).astype(float)
