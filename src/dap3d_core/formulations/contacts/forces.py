@@ -28,7 +28,7 @@ BOUNDLESS = 1e100
 @compiled
 def still_speed(s: ContactArrays, c: int) -> float:
     """Speed, m/s, below which a contact is at rest."""
-    return STILL * s.length[c]
+    return STILL * s.speed[c]
 
 
 @compiled

@@ -387,7 +387,7 @@ def hold_freest(s: ContactArrays, count: int, alone: int, first: int, end: int) 
     for k in range(s.closed_count):
         c = s.closed[k]
         for i in range(first, end if is_left(s, c, alone) else 0):
-            s.way[c, i] = s.holds[c, i] * s.length[c]
+            s.way[c, i] = s.holds[c, i] * s.speed[c]
             left += s.holds[c, i]
     best = 0
     while left > 0 and best >= 0:

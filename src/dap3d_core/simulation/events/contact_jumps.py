@@ -49,7 +49,7 @@ MOST_CHANGES, WITHIN = 2000, 1e-4
 MOST_JAMS, RATTLING = 500, 1e-2
 #: So many steps within this part of the run are too many: it would not come to an end.
 MOST_STEPS, SLOW = 10_000, 1e-5
-#: Slip, m/s, that may be stiff.
+#: Slip, m/s of an ordinary scene, that may be stiff.
 STIFF_SLIP = 1e-4
 #: Slip among the numbers of a contact.
 PLANE = slice(SLIP, SLIP + 3)
@@ -195,7 +195,7 @@ class ContactJumps(Jumps):
             if s.jammed >= 0:
                 self._stood, integration.work.status = (steps, t), Status.JUMPED
                 return
-            if is_slow and not np.any(sliding < STIFF_SLIP):
+            if is_slow and not np.any(sliding < STIFF_SLIP * table.speed):
                 integration.work.status = Status.RUNNING
             if is_slow or is_at_floor or not closed:
                 return

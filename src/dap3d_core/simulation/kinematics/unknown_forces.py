@@ -283,7 +283,7 @@ class ContactForces:
         outputs = table.outputs(t, u)
         find_grips(float(t), s, evaluator.system, table.tensions)
         put_rows(float(t), s, evaluator.system, evaluator.loops)
-        still, slip, G = STILL * table.length, s.slip, s.J[len(s.lam_free) :]
+        still, slip, G = STILL * table.speed, s.slip, s.J[len(s.lam_free) :]
         near = (np.abs(outputs[:, GAP]) < CLOSED * table.length) & (outputs[:, REACH] >= 0.0)
         columns, places, scale = list[Floats](), list[int](), list[float]()
         known = np.zeros(len(s.v))
@@ -324,7 +324,7 @@ class ContactForces:
             cones |= {c: cone} if under < 0 else {}
             for some in (states, loaded) if c in table.loads and sliding else (states,):
                 some[table.mode[c]] = 1.0 if sliding else 2.0
-                some[table.way[c]] = table.length[c] * way @ s.frames[c, across]
+                some[table.way[c]] = table.speed[c] * way @ s.frames[c, across]
         wrenches = np.array(columns).reshape(-1, len(s.v)).T
         load = {c: np.inf if c in table.loads else 1.0 for c in cones}  # unknown at first
         return Closed(wrenches, known, cones, places, scale, states, loaded, load)
