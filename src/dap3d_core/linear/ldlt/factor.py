@@ -27,6 +27,7 @@ import numpy as np
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
+from dap3d_core.kernels.scalar_math import where
 from dap3d_core.linear.ldlt.panels import factor_panel, solve_panel_backwards, solve_panel_forwards
 from dap3d_core.linear.ldlt.plan import COPY, DIAGONAL, PRODUCTS, TRANSPOSE
 from dap3d_core.linear.ordering.ordering import LEAST_ROWS
@@ -119,6 +120,28 @@ def weigh_rows(blocks: Integers, D: Floats, part: float, compliance: Floats) -> 
                 s += D[c] * D[c]
             compliance[f + r] += part * s
             o += 6
+
+
+@compiled
+def weigh_alike(blocks: Integers, D: Floats, part: float, compliance: Floats) -> None:
+    """As ``weigh_rows``, of what moves points by their directions alone, not by where these are.
+
+    Rows that depend on each other share forces as feet of one stiffness do, wherever they stand.
+    """
+    for k in range(compliance.shape[0]):
+        compliance[k] = 0.0
+    for q in range(blocks.shape[0]):
+        o, f = blocks[q, 0], blocks[q, 3]
+        for r in range(blocks[q, 2]):
+            compliance[f + r] += part * square_of_points(D[o : o + 6])
+            o += 6
+
+
+@compiled
+def square_of_points(row: Floats) -> float:
+    """The squared length of what of a row (6,) moves a body along, or of what turns it alone."""
+    s = row[0] * row[0] + row[1] * row[1] + row[2] * row[2]
+    return where(s > 0.0, s, row[3] * row[3] + row[4] * row[4] + row[5] * row[5])
 
 
 @compiled
