@@ -73,7 +73,7 @@ class MoreauIntegration(Integration):
     def __init__(self, evaluator: Evaluator, y0: Any, times: Any, **options: Any) -> None:
         """Args: the evaluator of the model; the others as of ``Integration``."""
         self._evaluator = evaluator
-        y0 = without_modes(evaluator, y0)
+        y0 = without_modes(evaluator, y0) if evaluator.model.contact_count else y0
         options |= {"watched": min(evaluator.watched, 1), "ends": (),
                     "length_count": evaluator.length_count}  # fmt: skip
         options.pop("stop_when_stiff", None)
