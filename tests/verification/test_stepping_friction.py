@@ -145,7 +145,7 @@ def test_friction_beside_a_damper_is_of_second_order():
 
 @pytest.mark.parametrize("contact", ["stepping", "events"])
 def test_a_run_that_begins_where_another_ended_rubs_once(contact):
-    """w = w_0 - n_c t / J: what slid there, and said so, slowed by its own force and the impulse."""
+    """w = w_0 - n_c t / J; what was said to slide had its own force besides the impulse."""
     scene, J, n_c, start = dap.Scene(name="hinge"), 0.3, 0.4, 2.0
     scene.add_body("wheel", mass=2.0, Jp=[0.5, 0.5, J], w=[0.0, 0.0, start])
     scene.add_joint("rev", "axle", P_i="wheel.O", P_j="ground.O", a_i="wheel.z", a_j="ground.z")

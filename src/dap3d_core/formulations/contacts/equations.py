@@ -61,7 +61,7 @@ from dap3d_core.formulations.contacts.watched_rates import store_watched, take_w
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.scalar_math import is_differentiated, where, with_slopes
-from dap3d_core.linear.ldlt.factor import weigh_alike
+from dap3d_core.linear.ldlt.factor import LEAST_ALIKE, weigh_alike
 from dap3d_core.linear.least_squares import invert
 
 #: Compliance of a row as part of its squared length; how much less where passes do not converge,
@@ -136,7 +136,7 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
 def factorise_contacts(system: System, part: float) -> None:
     """Factors; what slides and shares does so as on feet of one stiffness."""
     if slide_sharing(system):
-        weigh_alike(system.blocks, system.D, part, system.compliance)
+        weigh_alike(system.blocks, system.D, part, LEAST_ALIKE, system.compliance)
         factorise_regularised(system)
     else:
         factorise(system, part)

@@ -25,6 +25,7 @@ from dap3d_core.formulations.contacts.forces import (
     put_open,
     put_rates,
     put_sizes,
+    some_slide,
 )
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.least_squares import factor_least, put_null, solve_least
@@ -217,14 +218,13 @@ def come_inside(s: ContactArrays, free: int) -> bool:
 def share_alike(s: ContactArrays, free: int) -> bool:
     """Let forces ``cone.x`` that hold be those of feet of one stiffness, as in equations.py.
 
-    Along rows those are such as one motion of the bodies would give, A y without friction: nothing
-    along vectors without a motion, as many as may be added. False where they are not as many.
+    They have nothing along vectors that no motion of bodies gives; False if these are fewer.
     """
-    n, W, x, K, M = put_own_rows(s), s.W, s.cone.x, s.cone.K, s.cone.S
+    n, x, K, M = put_own_rows(s), s.cone.x, s.cone.K, s.cone.S
     for i in range(n):
-        row = 3 * s.closed[s.rows[i] // 3] + s.rows[i] % 3
+        row = s.W[3 * s.closed[s.rows[i] // 3] + s.rows[i] % 3]
         for k in range(n):
-            s.B[i, k] = W[row, 3 * s.closed[s.rows[k] // 3] + s.rows[k] % 3]
+            s.B[i, k] = row[3 * s.closed[s.rows[k] // 3] + s.rows[k] % 3]
     rank = factor_least(s.B, n, n, DEPENDENT, 0.0, s.w, s.order)
     if n - rank != free:
         return False
@@ -243,16 +243,6 @@ def share_alike(s: ContactArrays, free: int) -> bool:
         for j in range(free):
             x[k] += K[k, j] * s.cone.step[j]
     return rank == free
-
-
-@compiled
-def some_slide(s: ContactArrays) -> bool:
-    """True if a closed contact slides against friction."""
-    for k in range(s.closed_count):
-        c = s.closed[k]
-        if s.slides[c] != 0 and s.alone[c] == 0 and s.mu[c] > 0.0:
-            return True
-    return False
 
 
 @compiled

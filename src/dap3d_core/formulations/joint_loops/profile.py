@@ -13,7 +13,12 @@ from dap3d_core.formulations.joint_loops import layout
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.scalar_math import where
-from dap3d_core.linear.ldlt.factor import SINGULAR_NODE_RATIO, SINGULAR_PIVOT_RATIO
+from dap3d_core.linear.ldlt.factor import (
+    LEAST_ALIKE,
+    SINGULAR_NODE_RATIO,
+    SINGULAR_PIVOT_RATIO,
+    alike,
+)
 
 #: Solutions at most where rows may depend on each other. One leaves some ``PART`` of what lacked
 #: before, less of weak rows; they go on while the square of the change falls by this factor, until
@@ -41,7 +46,7 @@ def weigh_kept_rows(system: System, part: float) -> None:
         kept.compliance[j] = 0.0
     if part == 0.0:
         return
-    contacts, alike = system.contacts.shape[0] > 0, slide_sharing(system)
+    contacts, shares = system.contacts.shape[0] > 0, slide_sharing(system)
     cuts, ends, D = pointer(kept.cuts), pointer(kept.ends), pointer(kept.D)
     for q in range(kept.cuts.shape[0]):
         c = layout.CUT_WIDTH * q
@@ -54,7 +59,7 @@ def weigh_kept_rows(system: System, part: float) -> None:
                 x, y, z = scaled_moment(k, x, y, z)
                 own = (D[d] * D[d] + D[d + 1] * D[d + 1] + D[d + 2] * D[d + 2]) * k[0] * k[0]
                 turned, row = x * x + y * y + z * z, cuts[c + layout.FIRST] + r
-                own = own + where(alike & (own > 0.0), 0.0, turned)
+                own = where(shares, alike(own, turned, LEAST_ALIKE), own + turned)
                 others = kept.compliance[row]
                 least = where((own > 0.0) & (own < others), own, others)
                 kept.compliance[row] = where(contacts | (others == 0.0), others + own, least)

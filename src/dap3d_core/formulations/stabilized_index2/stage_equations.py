@@ -139,7 +139,7 @@ def keep_state(system: System, matrix: StageMatrix, part: float) -> None:
                 matrix.compliance[f + r] += part * system.D[c] * system.D[c]
             o += 6
     if part > 0.0 and constraints.slide_sharing(system):
-        weigh_alike(system.blocks, system.D, part, matrix.compliance)
+        weigh_alike(system.blocks, system.D, part, 0.0, matrix.compliance)
     for f in range(matrix.compliance.shape[0] if part > 0.0 else 0):
         if matrix.compliance[f] == 0.0:  # a row that is zero, as of an open contact
             matrix.compliance[f] = 1.0
