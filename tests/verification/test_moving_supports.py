@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 
@@ -74,6 +75,7 @@ def test_steps_on_a_turntable_are_of_second_order():
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05)
 
 
+@long_in_plain_python
 def test_slip_that_begins_with_a_run_is_not_a_step_late():
     """A point laid down on a turntable too fast for its friction, against scipy in the plane.
 

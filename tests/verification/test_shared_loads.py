@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 
@@ -61,6 +62,7 @@ def end_of(result):
     return [*result.r[-1, 0, :2], *result.rd[-1, 0, :2], result.w[-1, 0, 2]]
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("support", ["ground", "slab"])
 @pytest.mark.parametrize("settings", [{}, {"method": "joint"}, {"integrator": "radau"}])
 def test_feet_of_a_box_that_spins_share_its_load_as_springs_would(support, settings):
@@ -69,6 +71,7 @@ def test_feet_of_a_box_that_spins_share_its_load_as_springs_would(support, setti
     np.testing.assert_allclose(end_of(result), motion(), rtol=0.0, atol=TOLERANCE)
 
 
+@long_in_plain_python
 def test_what_happens_elsewhere_does_not_change_how_feet_share():
     """A ball that bounces on the same ground, and a run that goes on from the state reached."""
     scene = box_on("ground")
@@ -82,6 +85,7 @@ def test_what_happens_elsewhere_does_not_change_how_feet_share():
     np.testing.assert_allclose(end_of(result), motion(), rtol=0.0, atol=TOLERANCE)
 
 
+@long_in_plain_python
 def test_steps_share_alike_on_ground():
     """To the order of the step."""
     off = [
