@@ -153,6 +153,16 @@ def put_rates(s: ContactArrays) -> None:
 
 
 @compiled
+def some_slide(s: ContactArrays) -> bool:
+    """True if a closed contact slides against friction."""
+    found = False
+    for k in range(s.closed_count):
+        c = s.closed[k]
+        found |= s.slides[c] != 0 and s.alone[c] == 0 and s.mu[c] > 0.0
+    return found
+
+
+@compiled
 def solve_forces(s: ContactArrays, part: float, sticks: bool) -> bool:
     """Forces of closed contacts into ``cone.x``, which is where it begins, and ``rates``.
 

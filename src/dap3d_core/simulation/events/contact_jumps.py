@@ -31,7 +31,7 @@ from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.interface.contacts.rows import APART
-from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.model.state_layout import velocities_of
 from dap3d_core.registry.suggestions import some
 from dap3d_core.result import EventRecord
@@ -51,6 +51,9 @@ MOST_JAMS, RATTLING = 500, 1e-2
 MOST_STEPS, SLOW = 10_000, 1e-5
 #: Slip, m/s of an ordinary scene, that may be stiff.
 STIFF_SLIP = 1e-4
+#: Part of the largest mobility that is rounding of one; part of a unit force, or of what it moves,
+#: by which a motion depends on a share.
+UNRESOLVED, DEPENDS = 1e-10, 1e-6
 #: Slip among the numbers of a contact.
 PLANE = slice(SLIP, SLIP + 3)
 #: Records of changes from one mode to another.
@@ -94,7 +97,7 @@ class ContactJumps(Jumps):
         self._latest: deque[tuple[float, str]] = deque(maxlen=MOST_CHANGES)
         #: largest energy, J, that Newton's law has given in an instant; the instant, and contacts
         self._gain: tuple[float, float, str] = (0.0, 0.0, "")
-        #: Names of contacts that slid with unlike friction and shared what they carry.
+        #: Names of contacts that shared what they carry, slid, and moved as they shared it.
         self._sharing: set[str] = set()
 
     @cached_property
@@ -260,9 +263,10 @@ class ContactJumps(Jumps):
         if self._sharing:
             found.append(
                 f"contacts {some(sorted(self._sharing))} share what they carry, which bodies leave "
-                "open, and slid with unlike friction: the motion depends on how they share it, "
-                "here so that all are as far inside their cones as can be; give them one mu, or "
-                "let three points touch"
+                "open, and slid in unlike directions or with unlike friction: the motion depends "
+                "on how they share it, here as feet of one stiffness do where that presses all of "
+                "them, else so that all are as far inside their cones as can be; let three points "
+                "touch, or give the body feet on springs"
             )
         if self.count > MOST_RECORDS:
             words = f"contacts changed {self.count} times; the first {MOST_RECORDS} changes are"
@@ -355,9 +359,7 @@ class ContactJumps(Jumps):
         if work > max(LOSSLESS * s.exchanged, self._gain[0]) and np.any(s.newton[struck]):
             self._gain = (work, t, ", ".join(table.names[c] for c in struck))
         self._take_decided(integration, work)
-        share = s.near.any(axis=1)
-        if np.unique(s.mu[share]).size > 1 and self._slide()[share].any():
-            self._sharing |= {table.names[c] for c in np.flatnonzero(share)}
+        self._sharing |= {table.names[c] for c in moved_by_share(s, table.under)}
         after, works = self._after(u), s.work.copy()
         resisting = np.flatnonzero(table.under >= 0)
         np.add.at(works, table.under[resisting], s.work[resisting])
@@ -425,3 +427,32 @@ class ContactJumps(Jumps):
         self._record(
             EventRecord(name=name, t=t, direction=0, kind=kind, u=u, u_after=after, work=work)
         )
+
+
+def moved_by_share(s: ContactArrays, under: Integers) -> list[int]:
+    """Contacts that share what they carry, and whose friction moves bodies as they share it.
+
+    What they may carry more or less of, without a change of the rates of their rows, does so with
+    the friction of what slides.
+
+    Args:
+        s: with modes and forces as decided.
+        under: (m,) of what resists rolling, the contact that presses it; else -1.
+    """
+    share = np.flatnonzero(s.near.any(axis=1))
+    if not np.any((s.mode[share] == 1.0) & (s.force[share, 1:].any(axis=1))):
+        return []
+    rows = [3 * c + i for c in share for i in range(3)
+            if (s.mode[c] == 2.0 or i == 0) and (i > 0 or s.gapless[c] == 0.0)]  # fmt: skip
+    with_friction = np.zeros((len(s.W), len(rows)))
+    for k, row in enumerate(rows):
+        with_friction[row, k], c = 1.0, row // 3
+        for of in np.flatnonzero((s.mode == 1.0) & ((under == c) | (np.arange(len(under)) == c))):
+            if row % 3 == 0 and s.force[c, 0] > 0.0:
+                with_friction[3 * of + 1 : 3 * of + 3, k] = s.force[of, 1:] / s.force[c, 0]
+    _, size, across = np.linalg.svd(s.W[rows] @ with_friction)
+    free = with_friction @ across[np.sum(size > UNRESOLVED * size[0]) :].T
+    _, moved, ways = np.linalg.svd(s.moves.T @ free, full_matrices=False)
+    least = DEPENDS * np.max(np.linalg.norm(s.moves, axis=1))
+    carried = np.abs(free @ ways[moved > least].T).max(axis=1, initial=0.0)
+    return [c for c in share.tolist() if carried[3 * c : 3 * c + 3].max() > DEPENDS]
