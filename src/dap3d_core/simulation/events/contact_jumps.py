@@ -49,6 +49,9 @@ MOST_CHANGES, WITHIN = 2000, 1e-4
 MOST_JAMS, RATTLING = 500, 1e-2
 #: So many steps within this part of the run are too many: it would not come to an end.
 MOST_STEPS, SLOW = 10_000, 1e-5
+#: Stiffness that a change of modes ends within this part of the run, as of slip that turns while it
+#: vanishes, is none of the run.
+SOON = 1e-3
 #: Slip, m/s, that may be stiff.
 STIFF_SLIP = 1e-4
 #: Slip among the numbers of a contact.
@@ -415,6 +418,8 @@ class ContactJumps(Jumps):
         evaluator, work = self._evaluator, integration.work
         work.state[at.Y] = y
         integration.restart()
+        if 0.0 <= work.t - work.t_stiff < SOON * (work.times[-1] - work.times[0]):
+            work.t_stiff, work.stiff_steps = np.inf, 0
         evaluator.states = states
         evaluator.slope(integration.t, y)
 
