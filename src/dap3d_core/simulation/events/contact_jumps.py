@@ -45,6 +45,8 @@ from dap3d_core.simulation.events.jumps import LOSSLESS, MOST_RECORDS, Jumps, ro
 TOUCHING_AT_START = 1e-8
 #: Ends of modes within this part of the run: what changes more often comes to no end.
 MOST_CHANGES, WITHIN = 2000, 1e-4
+#: So many of them show whether bodies came behind a surface, where it touches and opens for ever.
+BEHIND = 50
 #: Jams that impulses ended, after which as many changes within this part come to none either.
 MOST_JAMS, RATTLING = 500, 1e-2
 #: So many steps within this part of the run are too many: it would not come to an end.
@@ -218,11 +220,12 @@ class ContactJumps(Jumps):
         latest, t = self._latest, integration.t
         latest.append((t, ", ".join(names)))
         passed, jams = t - latest[0][0], self.arrays.freed
-        within = RATTLING if jams > MOST_JAMS else WITHIN
-        if len(latest) < MOST_CHANGES or passed > within * self._span_of(integration):
+        within = (RATTLING if jams > MOST_JAMS else WITHIN) * self._span_of(integration)
+        if len(latest) % BEHIND == 0 and t - latest[-BEHIND][0] <= within:
+            self._refuse_overlap(integration)
+        if len(latest) < MOST_CHANGES or passed > within:
             return
         every = sorted({name for _, some in latest for name in some.split(", ")})
-        self._refuse_overlap(integration, every)
         start = f"the run stopped at t = {t:.9g} s: contacts {', '.join(every)}"
         if jams > MOST_JAMS:
             raise SimulationError(
@@ -236,9 +239,10 @@ class ContactJumps(Jumps):
             "before"
         )
 
-    def _refuse_overlap(self, integration: Integration, names: list[str]) -> None:
+    def _refuse_overlap(self, integration: Integration) -> None:
         """SimulationError where bodies came behind a surface past its end, which lies in them."""
         table, t = self.table, integration.t
+        names = {name for _, some in self._latest for name in some.split(", ")}
         outputs = table.outputs(t, self._state_of(integration))
         depth = np.where(outputs[:, REACH] < 0.0, 0.0, -outputs[:, GAP])
         for c in np.flatnonzero(depth > TOUCHING_AT_START * table.length).tolist():
@@ -247,7 +251,8 @@ class ContactJumps(Jumps):
                     f"the run stopped at t = {t:.9g} s: contact {table.names[c]} begins where its "
                     f"bodies overlap by {depth[c]:.3g} m: they came past an end of its surface, "
                     "beyond which nothing touches. Let the surface begin before that, or give its "
-                    "end a contact of its own (ball_ball, whose radius_i is 0 of an edge)"
+                    "end a contact of its own (ball_ball, whose radius_i is 0 of an edge), or a "
+                    "curve that is a thin wall a depth"
                 )
 
     def notes(self, integration: Integration) -> list[str]:
