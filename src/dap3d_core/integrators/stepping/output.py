@@ -207,7 +207,7 @@ def report_end(work: Any, report: Function, system: Any, loops: Any) -> bool:
 
 @compiled
 def left_of_stop(work: Any, t: float) -> float:
-    """The time to report at: on a stop, and just behind it, that before it where there are contacts.
+    """The time to report at: on a stop and just behind it that before it, where there are contacts.
 
     Their modes are those before it, and one that is about to lift would pull with functions as they
     are from there on.

@@ -45,6 +45,12 @@ _ABSENT: Any = object()
 _UNKNOWN = -2
 
 
+def keys_beside_fields(type_: Any) -> tuple[str, ...]:
+    """Keys that a type takes besides its own fields: limits and releases of joints."""
+    limits = LIMITS if getattr(type_, "limit", "") else ()
+    return limits + (RELEASES if type_.kind == "joint" else ())
+
+
 @attrs.frozen
 class _Field:
     """A field of a type: name, properties, index of its slot (-1: none), reader, value reader."""
@@ -96,9 +102,7 @@ class Reader:
         self.fields = [self._field(name, spec) for name, spec in specs.items()]
         self.kinds = {name: spec.kind for name, spec in specs.items()}
         self.lists = {name: spec for name, spec in specs.items() if spec.size}
-        limits = LIMITS if getattr(type_info.type, "limit", "") else ()
-        releases = RELEASES if table == "joints" else ()
-        self.known = dict.fromkeys([*specs, *self.ends, *limits, *releases])
+        self.known = dict.fromkeys([*specs, *self.ends, *keys_beside_fields(type_info.type)])
         self.of_joints = {name: spec for name, spec in specs.items() if spec.gives}
         # Bodies and points that may be left out follow from the other fields of their slot.
         self.late = [
