@@ -64,7 +64,9 @@ def test_frequencies_that_are_none_are_refused(wrong):
 
 def test_a_peak_is_that_between_the_samples():
     """Of x / y of a mass on a moving base, closed form; 61 samples are 6 dampings wide."""
-    r = np.unique(np.concatenate([np.geomspace(0.1, 10.0, 200), 1.0 + 0.3 * np.linspace(-1, 1, 61)]))
+    r = np.unique(
+        np.concatenate([np.geomspace(0.1, 10.0, 200), 1.0 + 0.3 * np.linspace(-1, 1, 61)])
+    )
 
     def gain(r, d=0.2j):
         return (1.0 + d * r) / (1.0 - r**2 + d * r)
