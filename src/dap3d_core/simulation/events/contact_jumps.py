@@ -17,6 +17,7 @@ from dap3d_core.formulations.contacts.contact_table import (
 )
 from dap3d_core.formulations.contacts.decide import (
     DRIVES,
+    HELD,
     OVERLAPS,
     PRESCRIBED,
     WEDGED,
@@ -387,15 +388,16 @@ class ContactJumps(Jumps):
             over = np.flatnonzero(gaps < -limit).tolist()
             raise SceneError([self._overlap(c, -gaps[c]) for c in over])
         start = f"the run stopped at t = {t:.9g} s: contact "
-        if failure == PRESCRIBED:
+        jammed = " with ".join(names[c] for c in np.flatnonzero(s.jams))
+        if failure == PRESCRIBED or (failure == WEDGED and self._is_prescribed()):
+            closes = names[s.culprit] if failure == PRESCRIBED else jammed
             raise SimulationError(
-                f"{start}{names[s.culprit]} closes, and joints or drivers prescribe the motion of "
+                f"{start}{closes} closes, and joints or drivers prescribe the motion of "
                 "its bodies: nothing that it pushes with can stop them"
             )
         if failure == DRIVES:
             mu = min(s.mu[s.culprit], s.mu_s[s.culprit]) * s.arm[s.culprit]
             raise SimulationError(f"{start}{words_of_drive(names[s.culprit], mu)}")
-        jammed = " with ".join(names[c] for c in np.flatnonzero(s.jams))
         if failure == WEDGED:
             is_newton = np.any(s.newton[s.jams != 0])
             remedy = 'Under law = "poisson" it stops' if is_newton else "Smaller mu may help"
@@ -407,6 +409,15 @@ class ContactJumps(Jumps):
             f"{start}{jammed} jams: its friction presses the bodies together by more than it lets "
             "them give way, and no motion with Coulomb's law goes on from here"
         )
+
+    def _is_prescribed(self) -> bool:
+        """Whether joints prescribe that contacts that jam close, together where not each alone."""
+        s, own = self.arrays, len(self.arrays.lam_free)
+        normals = 3 * np.flatnonzero(s.jams)
+        mobility, ways = np.linalg.eigh(s.W[np.ix_(normals, normals)])
+        held = ways[:, mobility <= HELD * np.max(s.W.diagonal())]
+        rates = s.J[own + normals] @ s.v_before
+        return bool(np.linalg.norm(held.T @ rates) > 0.5 * np.linalg.norm(rates) > 0.0)
 
     def _take_decided(self, integration: Integration, work: float) -> None:
         """Make the state ``y``, or the changes that led to it, that of an integration."""
