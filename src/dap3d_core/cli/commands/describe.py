@@ -103,7 +103,7 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
     from dap3d_core.cli.commands.describe_example import example_of
     from dap3d_core.interface.errors import where_is
     from dap3d_core.interface.fields import specs_of
-    from dap3d_core.scene.validate.elements import keys_beside_fields
+    from dap3d_core.scene.validate.joint_fields import keys_beside_fields
 
     type_info = registry.get(kind, keyword)
     type_: Any = type_info.type

@@ -10,7 +10,7 @@ from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.interface.types import acts_on_all
 from dap3d_core.scene.errors import MISSING, Key, dotted, shown
-from dap3d_core.scene.tables import GROUND, LIMITS, RELEASES, ZERO, Element
+from dap3d_core.scene.tables import GROUND, ZERO, Element
 from dap3d_core.scene.validate.coerce_values import (
     READERS,
     Fault,
@@ -30,7 +30,7 @@ from dap3d_core.scene.validate.geometry import (
     two_ends,
     vector_of,
 )
-from dap3d_core.scene.validate.joint_fields import with_joint_fields
+from dap3d_core.scene.validate.joint_fields import keys_beside_fields, with_joint_fields
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.types import Types, completed_type
 from dap3d_core.scene.validate.validated_scene import Instance, arguments_of
@@ -43,12 +43,6 @@ ENDS = ("P_i", "P_j")
 _ABSENT: Any = object()
 #: Body of a slot that no field has given yet.
 _UNKNOWN = -2
-
-
-def keys_beside_fields(type_: Any) -> tuple[str, ...]:
-    """Keys that a type takes besides its own fields: limits and releases of joints."""
-    limits = LIMITS if getattr(type_, "limit", "") else ()
-    return limits + (RELEASES if type_.kind == "joint" else ())
 
 
 @attrs.frozen
