@@ -185,3 +185,18 @@ def test_joints_and_overlaps_are_corrected_together():
     result = dap.simulate(scene, t_end=0.5, dt=0.1, contact_step=1e-3)
     assert len(result.contacts) > 0
     assert result.record.stepping["deepest"] < 1e-9
+
+
+@pytest.mark.parametrize("start", [0.5, 0.7])
+@pytest.mark.parametrize("integrator", ["dop853", "radau"])
+def test_no_report_on_a_break_point_pulls(integrator, start):
+    """A table that falls faster than g from then on leaves its load; 7 * 0.1 is a bit above 0.7."""
+    down = {"type": "step", "x_start": start, "x_end": start + 0.4, "f_end": -1.0}
+    scene = table("drive-tran", "ground.z", down, {})
+    scene.add_body("load", mass=2.0, Jp=[0.1] * 3, r=[0.0, 0.0, 0.1])
+    scene.add_contact("ball_plane", "c", P_i="load.O", radius=0.1, P_j="table.O", a_j="table.z")
+    result = dap.simulate(scene, t_end=start + 0.2, dt=0.1, integrator=integrator)
+    before = result.t < start + 1e-12
+    assert result.events[-1].kind == "lift"
+    assert result.contact("c").normal_force == pytest.approx(np.where(before, 2.0 * G, 0.0))
+    assert result.rdd[:, 1, 2] == pytest.approx(np.where(before, 0.0, -G), abs=1e-12)

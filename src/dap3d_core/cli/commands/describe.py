@@ -103,6 +103,7 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
     from dap3d_core.cli.commands.describe_example import example_of
     from dap3d_core.interface.errors import where_is
     from dap3d_core.interface.fields import specs_of
+    from dap3d_core.scene.validate.joint_fields import keys_beside_fields
 
     type_info = registry.get(kind, keyword)
     type_: Any = type_info.type
@@ -119,6 +120,7 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
         "bodies": list(type_info.layout.slots),
         "states": type_.state_lengths(),
         "synonyms": list(type_.synonyms),
+        "also": list(keys_beside_fields(type_)),
         **_class_data(type_info),
         "fields": [
             {
@@ -246,6 +248,8 @@ def _show(console: "Terminal", data: dict[str, Any], *, names: bool) -> None:
         states = (name if n == 1 else f"{name} ({n} numbers)" for name, n in data["states"].items())
         initial = "initial values by fields in _0, tolerances by fields in _atol"
         pairs.append(("states", f"{', '.join(states)}; {initial}"))
+    if data["also"]:
+        pairs.append(("also takes", f"{', '.join(data['also'])} (docs/reference/scene-file.md)"))
     console.facts(pairs)
     console.title("fields")
     if data["fields"]:

@@ -17,6 +17,7 @@ from dap3d_core.formulations.contacts.contact_table import (
 )
 from dap3d_core.formulations.contacts.decide import (
     DRIVES,
+    HELD,
     OVERLAPS,
     PRESCRIBED,
     WEDGED,
@@ -45,10 +46,15 @@ from dap3d_core.simulation.events.jumps import LOSSLESS, MOST_RECORDS, Jumps, ro
 TOUCHING_AT_START = 1e-8
 #: Ends of modes within this part of the run: what changes more often comes to no end.
 MOST_CHANGES, WITHIN = 2000, 1e-4
+#: So many of them show whether bodies came behind a surface, where it touches and opens for ever.
+BEHIND = 50
 #: Jams that impulses ended, after which as many changes within this part come to none either.
 MOST_JAMS, RATTLING = 500, 1e-2
 #: So many steps within this part of the run are too many: it would not come to an end.
 MOST_STEPS, SLOW = 10_000, 1e-5
+#: Stiffness that a change of modes ends within this part of the run, as of slip that turns while it
+#: vanishes, is none of the run.
+SOON = 1e-3
 #: Slip, m/s of an ordinary scene, that may be stiff.
 STIFF_SLIP = 1e-4
 #: Part of the largest mobility that is rounding of one; part of a unit force, or of what it moves,
@@ -218,11 +224,12 @@ class ContactJumps(Jumps):
         latest, t = self._latest, integration.t
         latest.append((t, ", ".join(names)))
         passed, jams = t - latest[0][0], self.arrays.freed
-        within = RATTLING if jams > MOST_JAMS else WITHIN
-        if len(latest) < MOST_CHANGES or passed > within * self._span_of(integration):
+        within = (RATTLING if jams > MOST_JAMS else WITHIN) * self._span_of(integration)
+        if len(latest) % BEHIND == 0 and t - latest[-BEHIND][0] <= within:
+            self._refuse_overlap(integration)
+        if len(latest) < MOST_CHANGES or passed > within:
             return
         every = sorted({name for _, some in latest for name in some.split(", ")})
-        self._refuse_overlap(integration, every)
         start = f"the run stopped at t = {t:.9g} s: contacts {', '.join(every)}"
         if jams > MOST_JAMS:
             raise SimulationError(
@@ -236,9 +243,10 @@ class ContactJumps(Jumps):
             "before"
         )
 
-    def _refuse_overlap(self, integration: Integration, names: list[str]) -> None:
+    def _refuse_overlap(self, integration: Integration) -> None:
         """SimulationError where bodies came behind a surface past its end, which lies in them."""
         table, t = self.table, integration.t
+        names = {name for _, some in self._latest for name in some.split(", ")}
         outputs = table.outputs(t, self._state_of(integration))
         depth = np.where(outputs[:, REACH] < 0.0, 0.0, -outputs[:, GAP])
         for c in np.flatnonzero(depth > TOUCHING_AT_START * table.length).tolist():
@@ -247,7 +255,8 @@ class ContactJumps(Jumps):
                     f"the run stopped at t = {t:.9g} s: contact {table.names[c]} begins where its "
                     f"bodies overlap by {depth[c]:.3g} m: they came past an end of its surface, "
                     "beyond which nothing touches. Let the surface begin before that, or give its "
-                    "end a contact of its own (ball_ball, whose radius_i is 0 of an edge)"
+                    "end a contact of its own (ball_ball, whose radius_i is 0 of an edge), or a "
+                    "curve that is a thin wall a depth"
                 )
 
     def notes(self, integration: Integration) -> list[str]:
@@ -381,15 +390,16 @@ class ContactJumps(Jumps):
             over = np.flatnonzero(gaps < -limit).tolist()
             raise SceneError([self._overlap(c, -gaps[c]) for c in over])
         start = f"the run stopped at t = {t:.9g} s: contact "
-        if failure == PRESCRIBED:
+        jammed = " with ".join(names[c] for c in np.flatnonzero(s.jams))
+        if failure == PRESCRIBED or (failure == WEDGED and self._is_prescribed()):
+            closes = names[s.culprit] if failure == PRESCRIBED else jammed
             raise SimulationError(
-                f"{start}{names[s.culprit]} closes, and joints or drivers prescribe the motion of "
+                f"{start}{closes} closes, and joints or drivers prescribe the motion of "
                 "its bodies: nothing that it pushes with can stop them"
             )
         if failure == DRIVES:
             mu = min(s.mu[s.culprit], s.mu_s[s.culprit]) * s.arm[s.culprit]
             raise SimulationError(f"{start}{words_of_drive(names[s.culprit], mu)}")
-        jammed = " with ".join(names[c] for c in np.flatnonzero(s.jams))
         if failure == WEDGED:
             is_newton = np.any(s.newton[s.jams != 0])
             remedy = 'Under law = "poisson" it stops' if is_newton else "Smaller mu may help"
@@ -401,6 +411,15 @@ class ContactJumps(Jumps):
             f"{start}{jammed} jams: its friction presses the bodies together by more than it lets "
             "them give way, and no motion with Coulomb's law goes on from here"
         )
+
+    def _is_prescribed(self) -> bool:
+        """Whether joints prescribe that contacts that jam close, together where not each alone."""
+        s, own = self.arrays, len(self.arrays.lam_free)
+        normals = 3 * np.flatnonzero(s.jams)
+        mobility, ways = np.linalg.eigh(s.W[np.ix_(normals, normals)])
+        held = ways[:, mobility <= HELD * np.max(s.W.diagonal())]
+        rates = s.J[own + normals] @ s.v_before
+        return bool(np.linalg.norm(held.T @ rates) > 0.5 * np.linalg.norm(rates) > 0.0)
 
     def _take_decided(self, integration: Integration, work: float) -> None:
         """Make the state ``y``, or the changes that led to it, that of an integration."""
@@ -417,6 +436,8 @@ class ContactJumps(Jumps):
         evaluator, work = self._evaluator, integration.work
         work.state[at.Y] = y
         integration.restart()
+        if 0.0 <= work.t - work.t_stiff < SOON * (work.times[-1] - work.times[0]):
+            work.t_stiff, work.stiff_steps = np.inf, 0
         evaluator.states = states
         evaluator.slope(integration.t, y)
 

@@ -126,11 +126,22 @@ def samples(modes: Floats, damping: Floats, first: float, last: float, count: in
 
 
 def peaks(frequencies: Floats, values: Complex) -> list[Peak]:
-    """Peaks of one response (f,), in the order of their frequencies."""
+    """Peaks of one response (f,), in the order of their frequencies.
+
+    Between samples by parabolas of the logarithms of gains, where neighbours are no less than half.
+    """
     gain = np.abs(values)
     inner = (gain[1:-1] >= gain[:-2]) & (gain[1:-1] > gain[2:])
     phase = np.unwrap(np.angle(np.where(np.isfinite(values), values, 0.0)))
-    return [
-        Peak(float(frequencies[k]), float(gain[k]), float(phase[k]))
-        for k in 1 + np.flatnonzero(inner)
-    ]
+    found = []
+    for k in 1 + np.flatnonzero(inner):
+        f, size, turn = (x[k - 1 : k + 2] for x in (frequencies, gain, phase))
+        if not size[1] < 2.0 * min(size[0], size[2]):
+            found.append(Peak(float(f[1]), float(size[1]), float(turn[1])))
+            continue
+        high = np.polyfit(f - f[1], np.log(size), 2)
+        x = -0.5 * high[1] / high[0]
+        through = np.polyfit(f - f[1], turn, 2)
+        peak = float(np.exp(np.polyval(high, x)))
+        found.append(Peak(float(f[1] + x), peak, float(np.polyval(through, x))))
+    return found
