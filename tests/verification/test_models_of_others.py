@@ -507,6 +507,19 @@ def test_comments_may_hold_two_dashes(tmp_path, suffix):
         imported(tmp_path, f"<!DOCTYPE a><!-- -- -->{text}", suffix)
 
 
+@pytest.mark.parametrize("before", ["\n", "<!-- by -->\n", "\n<!-- a -- b -->  <!-- c -->"])
+def test_a_declaration_may_come_after_blanks_and_comments(tmp_path, before):
+    text = hinge("urdf", "-1", "1")
+    late = f'{before}<?xml version="1.0"?>'
+    scene, _ = imported(tmp_path, f"{late}{text}", "urdf")
+    assert list(scene.bodies) == ["a"]
+    line = before.count("\n") + 2
+    with pytest.raises(dap.SceneError, match=rf":{line}: is not well-formed XML: mismatched tag"):
+        imported(tmp_path, f"{late}\n<robot></wrong>", "urdf")
+    with pytest.raises(dap.SceneError, match="XML or text declaration not at start of entity"):
+        imported(tmp_path, f"<robot>{late}</robot>", "urdf")
+
+
 NESTED = """<sdf version="1.9"><model name="outer">
   <link name="base"/><joint name="w" type="fixed"><parent>world</parent><child>base</child></joint>
   <model name="inner" {canonical}><pose>0 0 1 0 0 0</pose>

@@ -1,0 +1,138 @@
+"""SDF as its versions and its folders of models have it; what is expected is written out."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import dap3d_core as dap
+from dap3d_core.model.rotations import rotation
+
+QUARTER = "1.5707963267948966"
+
+#: A hinge about x of the model, whose second link is turned in it: about z of that link.
+HINGE = f"""<sdf version="%s"><world name="w">%s<model name="m"><pose>0 0 1 0 0 {QUARTER}</pose>
+<link name="a"/><link name="b"><pose %s="a">1 0 0 0 {QUARTER} 0</pose></link>
+<joint name="%s" type="revolute"><parent>a</parent><child>b</child>
+<axis><xyz%s>1 0 0</xyz></axis></joint></model></world></sdf>"""
+MOON = "<gravity>0 0 -1.6</gravity>"
+PHYSICS = f"<physics type='ode'>{MOON}</physics>"
+
+#: Link -> its <gravity>.
+GRAVITY = {"floats": "false", "falls": "true", "drops": 1}
+
+
+def imported(folder, text, **options):
+    path = folder / "a.sdf"
+    path.write_text(text)
+    return dap.import_model(path, **options)
+
+
+@pytest.mark.parametrize(
+    ("version", "gravity", "frame", "joint", "expressed", "axis", "size"),
+    [
+        ("1.11", MOON, "relative_to", "j", "", (0, 0, -1), 1.6),
+        ("1.11", PHYSICS, "relative_to", "j", ' expressed_in="a"', (0, 1, 0), 9.8),
+        ("1.10", MOON, "relative_to", "j", ' expressed_in="__model__"', (0, 1, 0), 1.6),
+        ("1.6", MOON, "frame", "b", "", (0, 0, -1), 1.6),
+        ("1.5", PHYSICS, "frame", "j", "", (0, 0, -1), 1.6),
+        ("1.4", PHYSICS, "relative_to", "b", "", (0, 1, 0), 1.6),
+        ("1.2", PHYSICS, "frame", "j", "", (0, 1, 0), 1.6),
+    ],
+)
+def test_axes_gravity_and_frames_are_those_of_the_version(
+    tmp_path, version, gravity, frame, joint, expressed, axis, size
+):
+    """Axes are in the frame of the model before 1.5, gravity is in <physics> before 1.6, and
+    relative_to is called frame before 1.7 (the conversions of the format's library)."""
+    scene, report = imported(tmp_path, HINGE % (version, gravity, frame, joint, expressed))
+    assert scene.forces["gravity"].fields["gravity"] == size
+    b, (rev,) = scene.bodies["b"], scene.joints.values()
+    assert_allclose(b.r, [0.0, 1.0, 1.0], atol=1e-15)  # beside a, along y of the world
+    name = rev.fields["a_i"]
+    local = scene.vectors[name].sp if name in scene.vectors else np.eye(3)["xyz".index(name[-1])]
+    assert_allclose(rotation(np.array(b.p)) @ local, axis, atol=1e-15)
+    called = [one.text for one in report.translated if "has the name of a link" in one.text]
+    assert called == (["joint b has the name of a link: it is called b_joint"] * (joint == "b"))
+
+
+def test_two_frames_of_one_name_and_a_version_of_attributes_are_refused(tmp_path):
+    with pytest.raises(dap.SceneError, match="there are two frames b"):
+        imported(tmp_path, HINGE % ("1.7", MOON, "relative_to", "b", ""))
+    with pytest.raises(dap.SceneError, match=r"(?s)version 1\.0 has.*convert it with gz sdf"):
+        imported(tmp_path, HINGE % ("1.0", PHYSICS, "frame", "j", ""))
+
+
+def test_a_link_without_gravity_stays_where_it_is(tmp_path):
+    """Another falls by g t^2 / 2; both move on in steps that are exact for it."""
+    text = "".join(f'<link name="{n}"><gravity>{g}</gravity></link>' for n, g in GRAVITY.items())
+    scene, report = imported(tmp_path, f'<sdf version="1.6"><model name="m">{text}</model></sdf>')
+    assert not report.left_out
+    result = dap.simulate(scene, t_end=0.5, dt=0.5)
+    fall = dict(zip(scene.bodies, result.r[-1, :, 2], strict=True))
+    assert_allclose(fall["floats"], 0.0, atol=1e-14)
+    assert_allclose([fall["falls"], fall["drops"]], -9.8 / 8.0, rtol=1e-9)
+
+
+ARM = """<sdf version="1.9"><model name="arm">
+<link name="base"><inertial><mass>3</mass></inertial></link>
+<link name="tip"><pose>0 0 1 0 0 0</pose><inertial><mass>2</mass></inertial></link>
+<frame name="flange" attached_to="tip"><pose>0 0 0.5 0 0 0</pose></frame>
+<joint name="lift" type="prismatic"><parent>__model__</parent><child>tip</child><axis/></joint>
+</model></sdf>"""
+CONFIG = """<model><name>An arm</name><sdf version="1.5">old.sdf</sdf>
+<sdf version="1.10">new.sdf</sdf><sdf version="1.9">old.sdf</sdf></model>"""
+HOLDER = """<sdf version="1.9"><model name="holder"><link name="hand"><pose>9 0 0 0 0 0</pose></link>
+<include %s><uri>%s</uri><name>left</name><pose>1 0 0 %s 0 0</pose></include>
+<joint name="grip" type="fixed"><parent>%sflange</parent><child>hand</child></joint>
+</model></sdf>"""
+
+
+def folder_of_arm(folder):
+    """A folder of a model, whose configuration names the file of the newest version."""
+    folder.mkdir(parents=True)
+    (folder / "model.config").write_text(CONFIG)
+    (folder / "old.sdf").write_text(ARM.replace("2</mass>", "7</mass>"))
+    (folder / "new.sdf").write_text(ARM)
+
+
+@pytest.mark.parametrize(("merge", "scope"), [("", "left::"), ('merge="true"', "")])
+def test_a_merged_model_moves_as_a_nested_one_by_its_own_names(tmp_path, merge, scope):
+    """A quarter turn about x takes its z axis to -y; its joint and frames keep their places."""
+    folder_of_arm(tmp_path / "arm")
+    scene, report = imported(tmp_path, HOLDER % (merge, "arm", QUARTER, scope))
+    assert not report.left_out
+    base, tip = scene.bodies[f"{scope}base"], scene.bodies[f"{scope}tip"]
+    assert (base.mass, tip.mass) == (3.0, 3.0)  # the hand of 1 kg is fixed to the tip
+    assert_allclose(base.r, [1.0, 0.0, 0.0], atol=1e-15)
+    assert_allclose(tip.r, [(2.0 * 1.0 + 9.0) / 3.0, -2.0 / 3.0, 0.0], atol=1e-15)
+    ((name, lift),) = scene.joints.items()
+    assert (name, lift.type, lift.fields["a_j"]) == (f"{scope}lift", "tran", f"{scope}base.z")
+
+
+@pytest.mark.parametrize(
+    ("at", "uri"),
+    [
+        ("arm", "arm"),
+        ("models/arm", "model://arm"),
+        ("some/where/arm", "arm"),
+        ("models/arm", "https://fuel.gazebosim.org/1.0/someone/models/arm"),
+        ("models/arm", "https://fuel.gazebosim.org/1.0/someone/models/arm/tip"),
+        ("models/arm", "file://arm"),
+    ],
+)
+def test_a_model_is_found_by_its_name_below_the_root(tmp_path, at, uri):
+    folder_of_arm(tmp_path / at)
+    scene, _ = imported(tmp_path, HOLDER % ("", uri, 0, "left::"))
+    assert scene.bodies["left::tip"].mass == 3.0
+
+
+def test_a_model_that_is_not_found_is_named(tmp_path):
+    text = HOLDER % ("", "https://fuel.gazebosim.org/1.0/someone/models/arm", 0, "left::")
+    with pytest.raises(dap.SceneError, match="(?s)the package arm is not known.*--package arm="):
+        imported(tmp_path, text)
+    for folder in ("one", "two"):
+        folder_of_arm(tmp_path / folder / "arm")
+    with pytest.raises(dap.SceneError, match="(?s)there are 2 folders arm.*--package arm="):
+        imported(tmp_path, text)
+    scene, _ = imported(tmp_path, text, packages={"arm": tmp_path / "two" / "arm"})
+    assert scene.bodies["left::tip"].mass == 3.0
