@@ -490,6 +490,14 @@ def test_a_double_pendulum_of_points_moves_as_its_closed_form(tmp_path, tiny, la
     assert result.ledger["energy"].ok
 
 
+def test_a_limit_of_urdf_without_bounds_is_none_and_says_so(tmp_path):
+    text = hinge("urdf", "-1", "1").replace('lower="-1" upper="1" ', "")
+    scene, report = imported(tmp_path, text, "urdf")
+    assert [force for force in scene.forces if force != "gravity"] == []
+    [said] = [one for one in report.translated if "<limit> without lower and upper" in one.text]
+    assert said.motion
+
+
 # --------------------------------------------------------------------------- files and names
 
 

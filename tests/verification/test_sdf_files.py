@@ -132,7 +132,52 @@ def test_a_model_that_is_not_found_is_named(tmp_path):
         imported(tmp_path, text)
     for folder in ("one", "two"):
         folder_of_arm(tmp_path / folder / "arm")
-    with pytest.raises(dap.SceneError, match="(?s)there are 2 folders arm.*--package arm="):
+    with pytest.raises(dap.SceneError, match="(?s)there are 2 folders arm within.*--package arm="):
         imported(tmp_path, text)
     scene, _ = imported(tmp_path, text, packages={"arm": tmp_path / "two" / "arm"})
     assert scene.bodies["left::tip"].mass == 3.0
+
+
+BAR = """<collision name="bar"><pose>0.5 0 0 0 0 %s</pose><geometry>
+<box><size>0.2 1 0.1</size></box></geometry>%s</collision>"""
+TIP = """<collision name="tip"><pose>1 0 0 0 0 0</pose><geometry>%s</geometry></collision>"""
+AUTO = """<sdf version="1.12"><model name="m"><link name="a"><inertial auto="true">
+<pose>9 9 9 0 0 0</pose>%s</inertial>%s</link></model></sdf>"""
+BALL = "<sphere><radius>0.1</radius></sphere>"
+ROD = "<mesh><scale>2 1 1</scale><uri>cube.obj</uri></mesh>"
+CUBE = """v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1
+f 1 3 4\nf 1 4 2\nf 5 6 8\nf 5 8 7\nf 1 2 6\nf 1 6 5\nf 3 7 8\nf 3 8 4\nf 1 5 7\nf 1 7 3\nf 2 4 8
+f 2 8 6"""
+
+
+@pytest.mark.parametrize(
+    ("density", "own", "mass"), [("", "", 0.0), ("<density>500</density>", "", 0.0),
+                                 ("", "<density>250</density>", 0.0), ("", "", 3.0)]
+)  # fmt: skip
+def test_inertials_are_those_of_the_volumes_of_collisions(tmp_path, density, own, mass):
+    """A bar of 20 l along x, turned a quarter, and a ball at its end; 1000 kg/m^3 by default."""
+    usual = 500.0 if density else 1000.0
+    bar, ball = 0.02 * (250.0 if own else usual), 4.0 / 3.0 * np.pi * 1e-3 * usual
+    given = density + (f"<mass>{mass}</mass>" if mass else "")
+    scene, _ = imported(tmp_path, AUTO % (given, BAR % (QUARTER, own) + TIP % BALL))
+    ratio = mass / (bar + ball) if mass else 1.0
+    at, reduced = (0.5 * bar + ball) / (bar + ball), bar * ball / (bar + ball) * 0.25
+    turned = np.array([0.05, 1.01, 1.04]) / 12.0 * bar + 0.004 * ball + [0.0, reduced, reduced]
+    body = scene.bodies["a"]
+    assert_allclose(body.mass, ratio * (bar + ball), rtol=1e-14)
+    assert_allclose(body.r, [at, 0.0, 0.0], atol=1e-15)
+    J = np.array(body.Jp) if np.ndim(body.Jp) == 2 else np.diag(body.Jp)
+    assert_allclose(J, ratio * np.diag(turned), rtol=1e-13, atol=1e-14)
+
+
+def test_inertials_of_meshes_need_their_files(tmp_path):
+    with pytest.raises(dap.SceneError, match=r"there is no file cube\.obj; its mass properties"):
+        imported(tmp_path, AUTO % ("", TIP % ROD), shapes=False)
+    (tmp_path / "cube.obj").write_text(CUBE)
+    scene, _ = imported(tmp_path, AUTO % ("", TIP % ROD), shapes=False)
+    body = scene.bodies["a"]
+    assert_allclose([body.mass, *body.r], [2000.0, 2.0, 0.5, 0.5], rtol=1e-14)
+    assert_allclose(body.Jp, 2000.0 / 12.0 * np.array([2.0, 5.0, 5.0]), rtol=1e-13)
+    for shape, words in (("<cone/>", "the mass of a <cone> is not"), ("", "without a volume")):
+        with pytest.raises(dap.SceneError, match=words):
+            imported(tmp_path, AUTO % ("", TIP % shape))

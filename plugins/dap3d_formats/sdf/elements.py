@@ -20,7 +20,7 @@ SDF: Table = {
     "pose": taken("relative_to degrees rotation_format") | noted("frame", "from version 1.7 on"),
     "frame": taken("name attached_to"),
     "link": taken("name"),
-    "inertial": taken("auto") | noted("density", "give mass and inertia"),
+    "inertial": taken("auto"),
     "mass": taken(), "inertia": taken(),
     "ixx": taken(), "ixy": taken(), "ixz": taken(), "iyy": taken(), "iyz": taken(), "izz": taken(),
     "visual": taken() | translated("name", "shapes are named after their link"),
@@ -88,7 +88,7 @@ SDF: Table = {
     "projector": noted("", _SIMULATOR), "particle_emitter": noted("", _SIMULATOR),
     "cast_shadows": noted("", "lighting"), "transparency": noted("", "opacity"),
     "visibility_flags": noted("", "drawing"), "meta": noted("", "drawing"),
-    "density": noted("", "give mass and inertia"), "auto_inertia_params": noted("", "not read"),
+    "density": taken(), "auto_inertia_params": noted("", "of meshes; they are solids here"),
     "fluid_added_mass": moves("", "added mass of a fluid"),
 }  # fmt: skip
 

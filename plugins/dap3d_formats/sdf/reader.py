@@ -20,7 +20,11 @@ from dap3d_core.interface.formats import (
     Source,
     XmlElement,
     from_quaternion,
+    inertia_moved,
+    inertia_of_mesh,
+    inertia_of_solid,
     rpy,
+    total_inertia,
 )
 from dap3d_formats.axes import along
 from dap3d_formats.element_table import note_elements
@@ -31,6 +35,10 @@ from dap3d_formats.shapes import SIZES, add_shapes, hexadecimal
 
 #: Speed below which nothing bounces from which on nothing ever does, m/s: the default is 1e5.
 FAST = 1e3
+#: Kinds of solids, and names of their sizes.
+SOLIDS = SIZES | {"ellipsoid": {"radii": 3}}
+#: Density of collisions of which none is given, kg/m^3.
+WATER = 1000.0
 #: The address of a model on Gazebo's server; its name.
 SERVED = re.compile(r"https?://fuel\.[^/]+/[^/]+/[^/]+/models/([^/]+)(?:/\w+)?")
 #: What a link may hold.
@@ -219,7 +227,7 @@ class SdfReader:
             self.remarks.translate(link.place, "a link without <inertial> has 1 kg and 1 kg m^2")
             return Inertial(1.0, inertia=[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
         if element.get("auto") in ("true", "1"):
-            raise FormatError('<inertial auto="true">: give mass and inertia', element.place)
+            return self._computed_inertial(link, element)
         mass, inertia = element.first("mass"), element.first("inertia")
         pose, _ = self.pose(element)
         usual = {"ixx": 1.0, "iyy": 1.0, "izz": 1.0, "ixy": 0.0, "ixz": 0.0, "iyz": 0.0}
@@ -229,6 +237,34 @@ class SdfReader:
         return Inertial(
             1.0 if mass is None else mass.content(1)[0], pose.r, pose.A @ rows @ pose.A.T
         )
+
+    def _computed_inertial(self, link: XmlElement, element: XmlElement) -> Inertial:
+        """The inertial of the volumes of a link's collisions, with its mass where that is given."""
+        usual, parts = numbers(element, "density", 1, (WATER,)), []
+        for collision in link.all("collision"):
+            shape = next(iter(collision.first("geometry") or ()), None)
+            if shape is None:
+                continue
+            com: Any = (0.0, 0.0, 0.0)
+            if shape.name in SOLIDS:
+                volume, unit_inertia = inertia_of_solid(shape.name, _sizes(shape))
+            elif shape.name == "mesh":
+                path = self.source.locate(text_of(shape, "uri"), shape.place, required=True)
+                assert path is not None
+                vertices, triangles = self.source.mesh(path, shape.place)
+                scale = numbers(shape, "scale", 3, (1.0, 1.0, 1.0))
+                volume, com, unit_inertia = inertia_of_mesh(vertices * scale, triangles)
+            else:
+                what = f"the mass of a <{shape.name}> is not computed"
+                raise FormatError(what, shape.place, "give mass and inertia to its link")
+            mass = abs(volume) * numbers(collision, "density", 1, usual)[0]
+            part = Inertial(mass, com, mass * unit_inertia)
+            parts.append(inertia_moved(part, self.pose(collision)[0]))
+        total = total_inertia(parts) if parts else Inertial(0.0)
+        if not total.mass > 0.0:
+            raise FormatError('<inertial auto="true"> of a link without a volume', element.place)
+        ratio = numbers(element, "mass", 1, (total.mass,))[0] / total.mass
+        return Inertial(ratio * total.mass, total.com, ratio * total.inertia)
 
     def _geometry(
         self, element: XmlElement, shape: XmlElement | None, collision: bool
@@ -240,10 +276,8 @@ class SdfReader:
         common["color"] = _color(element.first("material"))
         if collision and self.source.contacts:
             common["contact"] = _contact(element, self.remarks)
-        sizes = SIZES | {"ellipsoid": {"radii": 3}}
-        if shape.name in sizes:
-            size = [numbers(shape, *one) for one in sizes[shape.name].items()]
-            return Geometry(shape.name, tuple(chain(*size)), **common)
+        if shape.name in SOLIDS:
+            return Geometry(shape.name, _sizes(shape), **common)
         if shape.name == "mesh":
             path = self.source.locate(text_of(shape, "uri"), shape.place)
             scale = numbers(shape, "scale", 3, (1.0, 1.0, 1.0))
@@ -308,6 +342,10 @@ def numbers(
             return default
         raise FormatError(f"<{element.name}> has no <{name}>; it is required", element.place)
     return child.content(count)
+
+
+def _sizes(shape: XmlElement) -> tuple[float, ...]:
+    return tuple(chain(*(numbers(shape, *one) for one in SOLIDS[shape.name].items())))
 
 
 def _contact(collision: XmlElement, remarks: Remarks) -> Contact:

@@ -221,7 +221,7 @@ class SourceFiles:
         what = f"{uri}: the package {package} is not known"
         remedy = f"name its folder with --package {package}=FOLDER, or one that holds it with --root"
         if found:
-            what = f"{uri}: there are {len(found)} folders {package}, as {found[0]} and {found[1]}"
+            what = f"{uri}: there are {len(found)} folders {package} within the root"
             remedy = f"name one with --package {package}=FOLDER"
         raise _UnknownPlaceError(what, place, remedy)
 
