@@ -126,10 +126,25 @@ def test_a_model_is_found_by_its_name_below_the_root(tmp_path, at, uri):
     assert scene.bodies["left::tip"].mass == 3.0
 
 
+def test_an_included_light_is_left_out(tmp_path):
+    (tmp_path / "sun").mkdir()
+    (tmp_path / "sun" / "model.sdf").write_text('<sdf version="1.6"><light name="sun"/></sdf>')
+    include = "<include><uri>model://sun</uri></include>"
+    text = f'<sdf version="1.6"><world name="w">{include}<model name="m"><link name="a"/></model>'
+    scene, report = imported(tmp_path, f"{text}</world></sdf>")
+    assert len(scene.bodies) == 1
+    assert [str(one) for one in report.left_out] == ["sun/model.sdf:1: <light>: lights"]
+    (tmp_path / "sun" / "model.sdf").write_text('<sdf version="1.6"/>')
+    with pytest.raises(dap.SceneError, match="model://sun holds no <model>"):
+        imported(tmp_path, f"{text}</world></sdf>")
+
+
 def test_a_model_that_is_not_found_is_named(tmp_path):
     text = HOLDER % ("", "https://fuel.gazebosim.org/1.0/someone/models/arm", 0, "left::")
     with pytest.raises(dap.SceneError, match="(?s)the package arm is not known.*--package arm="):
         imported(tmp_path, text)
+    with pytest.raises(dap.SceneError, match="--package 'an arm=FOLDER'"):
+        imported(tmp_path, text.replace("models/arm", "models/an arm"))
     for folder in ("one", "two"):
         folder_of_arm(tmp_path / folder / "arm")
     with pytest.raises(dap.SceneError, match="(?s)there are 2 folders arm within.*--package arm="):

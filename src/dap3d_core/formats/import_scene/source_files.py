@@ -1,6 +1,7 @@
 """Reads the files of a model: none outside of its folder and of packages that the user names."""
 
 import os
+import shlex
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from io import BytesIO
@@ -219,10 +220,11 @@ class SourceFiles:
         if len(found) == 1:
             return found[0]
         what = f"{uri}: the package {package} is not known"
-        remedy = f"name its folder with --package {package}=FOLDER, or one that holds it with --root"
+        option = f"--package {shlex.quote(f'{package}=FOLDER')}"
+        remedy = f"name its folder with {option}, or one that holds it with --root"
         if found:
             what = f"{uri}: there are {len(found)} folders {package} within the root"
-            remedy = f"name one with --package {package}=FOLDER"
+            remedy = f"name one with {option}"
         raise _UnknownPlaceError(what, place, remedy)
 
     def _folders(self) -> dict[str, list[Path]]:
