@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from dap3d_core.interface.formats import FormatError, Remarks, XmlElement
+from dap3d_core.interface.formats import WORLD, FormatError, Remarks, XmlElement
 
 #: The first version whose poses and numbers are elements, as they are in all later ones.
 FIRST = (1, 2)
@@ -60,7 +60,7 @@ def _below(root: XmlElement) -> Iterator[XmlElement]:
 
 def _rename_joints(model: XmlElement, remarks: Remarks) -> None:
     """Give joints that have the name of a link another one: each is the name of a frame."""
-    links = {link.get("name") for link in model.all("link")}
+    links = {WORLD, *(link.get("name") for link in model.all("link"))}
     for joint in model.all("joint"):
         name = joint.get("name", "")
         if name in links:

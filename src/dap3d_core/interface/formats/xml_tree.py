@@ -127,8 +127,8 @@ def numbers_in(
 def parse_xml(text: str | bytes, file: str) -> XmlElement:
     """The root of an XML document.
 
-    Its comments may hold ``--``, and its declaration may come after blanks and comments: XML forbids
-    it, and the readers of Gazebo and MuJoCo allow it.
+    Its comments may hold ``--``, and its declaration may come after blanks and comments: XML
+    forbids it, and the readers of Gazebo and MuJoCo allow it.
 
     Raises:
         FormatError: it is not well-formed, has a document type, or too many or too deep elements.
