@@ -11,7 +11,8 @@ QUARTER = "1.5707963267948966"
 
 #: A hinge about x of the model, whose second link is turned in it: about z of that link.
 HINGE = f"""<sdf version="%s"><world name="w">%s<model name="m"><pose>0 0 1 0 0 {QUARTER}</pose>
-<link name="a"/><link name="b"><pose %s="a">1 0 0 0 {QUARTER} 0</pose></link>
+<link name="a"><pose>0 0 0.5 0 0 0</pose></link>
+<link name="b"><pose %s="a">1 0 0 0 {QUARTER} 0</pose></link>
 <joint name="%s" type="revolute"><parent>a</parent><child>b</child>
 <axis><xyz%s>1 0 0</xyz></axis></joint></model></world></sdf>"""
 MOON = "<gravity>0 0 -1.6</gravity>"
@@ -47,7 +48,7 @@ def test_axes_gravity_and_frames_are_those_of_the_version(
     scene, report = imported(tmp_path, HINGE % (version, gravity, frame, joint, expressed))
     assert scene.forces["gravity"].fields["gravity"] == size
     b, (rev,) = scene.bodies["b"], scene.joints.values()
-    assert_allclose(b.r, [0.0, 1.0, 1.0], atol=1e-15)  # beside a, along y of the world
+    assert_allclose(b.r, [0.0, 1.0, 1.5], atol=1e-15)  # beside a, along y of the world
     name = rev.fields["a_i"]
     local = scene.vectors[name].sp if name in scene.vectors else np.eye(3)["xyz".index(name[-1])]
     assert_allclose(rotation(np.array(b.p)) @ local, axis, atol=1e-15)
