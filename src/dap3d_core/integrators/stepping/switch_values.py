@@ -121,7 +121,7 @@ def correct_rates(
     That is so by the square of h. What joints and contacts hold together slips by it, more than
     ends such a mode. Other rates keep what they are to rounding, which projection adds to.
     """
-    s, (row, out), outcome = work.switches, rows, work.limits[at.ASIDE :]
+    s, (row, out), outcome = work.switches, rows, work.limits[at.LIMITS_END :]
     outcome[0] = outcome[1] = 0.0
     work.projection_count += 1
     project(t, x, outcome, system, loops)
