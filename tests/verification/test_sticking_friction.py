@@ -137,7 +137,7 @@ def test_what_sticks_holds_no_less_than_what_slides():
 
 @pytest.mark.parametrize(("first", "second"), [(1.0, 0.02), (0.1, 0.3), (0.02, 1.0)])
 def test_gears_on_hinges_that_rub_come_to_rest(first, second):
-    """I w_dot = -n, by the first wheel: 0.02 + 0.02 / 4 kg m^2, first + second / 2 N m, from 8 rad/s.
+    """I w_dot = -n of the first, from 8 rad/s: 0.02 + 0.02 / 4 kg m^2, first + second / 2 N m.
 
     Both stop at once. What they had then, 1e-46 rad/s^2 that no friction of gears in mesh could
     give, had no solution, and runs ended as a jam.

@@ -164,9 +164,7 @@ class IntegrationState(Arrays):
     crossings: Matrix  # (LOGGED, 3) where they changed their sign; no row without switches
     tolerance: Matrix  # (TOLERANCES, n)
     stops: Matrix  # (STOP_ROWS, s) instants that no step crosses (break_points.py)
-    limits: (
-        Floats  # scalars; behind them (LIMITS_END) what project gives of a state beside the motion
-    )
+    limits: Floats  # scalars; from LIMITS_END on what project gives of a state beside
 
 
 #: Indices in ``real``: of the first number that project gives, and of the singularity measures.
