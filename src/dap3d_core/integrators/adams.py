@@ -293,7 +293,7 @@ def step(work: AdamsState, functions: Any, system: Any, loops: Any) -> None:
         failure = project_state(work, t1, trial, project, system, loops)
         if failure != at.RUNNING:
             reject(work, t1, h, 1, 0.1, failure)
-        elif complete_step(work, t1, rhs, watch, system, loops):
+        elif complete_step(work, t1, rhs, project, watch, system, loops):
             if step_control.turns_are_certain(work, t1, accepted, system, loops):
                 accept(work, t1, k, here, below, lower)
             else:
@@ -329,8 +329,9 @@ def error_of(work: AdamsState, t1: float, h: float, k: int, size: float) -> floa
 
 @compiled
 def complete_step(
-    work: AdamsState, t1: float, rhs: Function, watch: Function, system: Any, loops: Any
-) -> bool:
+    work: AdamsState, t1: float, rhs: Function, project: Function, watch: Function, system: Any,
+    loops: Any,
+) -> bool:  # fmt: skip
     """The rates at the trial state; False where they are not finite, or it lies across a switch."""
     rates = work.scaled[ROWS - 1]
     trial, total, watched = work.state[at.TRIAL], work.state[at.SCRATCH], work.switch_count != 0
@@ -344,7 +345,7 @@ def complete_step(
         if not all_finite(rates):
             work.t_stop, work.status = t1, at.NOT_FINITE
             return False
-    return not (watched and end_is_across(work, t1, rates, watch, system, loops))
+    return not (watched and end_is_across(work, t1, rates, project, watch, system, loops))
 
 
 @compiled
