@@ -253,8 +253,7 @@ def _show(console: "Terminal", data: dict[str, Any], *, names: bool) -> None:
     console.facts(pairs)
     console.title("fields")
     if data["fields"]:
-        rows = [(f["name"], f["kind"], default_text(f), f["unit"] or "-",
-                 "; ".join(filter(None, (f["doc"], f["allowed"]))))
+        rows = [(f["name"], f["kind"], default_text(f), f["unit"] or "-", meaning_text(f))
                 for f in data["fields"]]  # fmt: skip
         console.table(("field", "kind", "default", "unit", "meaning"), rows, fixed=(0, 1, 3))
     else:
@@ -264,8 +263,7 @@ def _show(console: "Terminal", data: dict[str, Any], *, names: bool) -> None:
         console.table(*variants_table(data), fixed=(0,))
     if names:
         console.title(f"names for its kernels ({', '.join(data['kernels'])})")
-        rows_ = [(n["name"], " x ".join(map(str, n["shape"])) or "number", n["level"], n["doc"])
-                 for n in data["names"]]  # fmt: skip
+        rows_ = [(n["name"], shape_text(n["shape"]), n["level"], n["doc"]) for n in data["names"]]
         console.table(("name", "shape", "level", "meaning"), rows_, fixed=(0, 1, 2))
     console.title("example")
     console.say(data["example"].rstrip(), indent=2)
@@ -336,6 +334,16 @@ def default_text(field: Mapping[str, Any]) -> str:
     if isinstance(default, float):
         return f"{default:g}"
     return "-" if default is None else _word(default)
+
+
+def meaning_text(field: Mapping[str, Any]) -> str:
+    """The meaning of a field and its allowed values."""
+    return "; ".join(w for w in (field["doc"], field["allowed"]) if w)
+
+
+def shape_text(shape: list[int]) -> str:
+    """The shape of an array."""
+    return " x ".join(map(str, shape)) if shape else "number"
 
 
 def _word(value: Any) -> str:

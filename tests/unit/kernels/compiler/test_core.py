@@ -114,8 +114,9 @@ NOT_CALLED = {
         "integrators.stepping.output": "report_end",
         "integrators.runge_kutta.step": "is_rounding",
         "integrators.stepping.event_location": "cut_step is_sample_across put_rates_before",
-        "integrators.stepping.switch_values": "first_across has_jumped",
+        "integrators.stepping.switch_values": "first_across has_jumped correct_rates",
         "linear.rank": "solve_each",
+        "linear.ldlt.factor": "weigh_alike square_of_corner",  # of contacts
         "study.batch.initial_state": "keep put_back",  # of differentiated code
         # of jumps with closed forms: unit/formulations/jumps, unit/simulation/events
         "formulations.jumps.multipliers": "rotate seek_active",
