@@ -182,7 +182,7 @@ def slide_sharing(s: ContactArrays) -> bool:
     found = False
     for c in range(s.mode.shape[0]):
         for i in range(3):
-            found |= s.mode[c] == 1.0 and s.near[c, i] != 0.0
+            found |= s.mode[c] > 0.5 and s.near[c, i] != 0.0
     return found
 
 
@@ -193,12 +193,21 @@ def share_anew(
     """Divide what contacts carry at the present velocities; False if other modes are found."""
     s.in_touch_count = 0
     for c in range(s.mode.shape[0]):
-        s.was[c], s.begins[c], s.leaves[c] = s.mode[c], 0, 0
+        s.was[c], s.begins[c], s.leaves[c] = s.mode[c], s.mode[c] == 1.0, 0
         if s.mode[c] > 0.5:
             s.in_touch[s.in_touch_count] = c
             s.in_touch_count += 1
+        slips = size_across(s, c, s.slip[c]) > STOPPED * s.length[c]
+        for i in range(3):  # of what slides from rest
+            s.begin_way[c, i] = 0.0
+            for k in range(3):
+                part = s.arm[c] / s.length[c] * s.way[c, k]
+                s.begin_way[c, i] += s.frames[c, i, k] * part
+            s.slip[c, i] = s.slip[c, i] if slips else 0.0
     move_on(t, s, system, loops, tensions)
+    s.repeats = 1
     are_same = find_modes_now(t, s, system, loops, functions)
+    s.repeats = 0
     for c in range(s.mode.shape[0]):
         are_same &= s.mode[c] == s.was[c]
     return are_same

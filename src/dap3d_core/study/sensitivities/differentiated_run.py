@@ -13,6 +13,7 @@ from dap3d_core.integrators.stepping.integration_state import CROSSED, Y
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.lanes import Differentiation
 from dap3d_core.simulation import SimulationError
+from dap3d_core.simulation.handover import switch_integrator
 from dap3d_core.simulation.run import Run
 from dap3d_core.study.batch.compiled_batch import arrays_of_numbers
 from dap3d_core.study.sensitivities.ending_slip import EndingSlip
@@ -52,30 +53,37 @@ class DifferentiatedRun(Run):
         return self
 
     def begin(self, integration: Integration) -> None:
-        """As of ``RunState``: the integration is differentiated.
-
-        Raises:
-            SimulationError: it is the second one of the run.
-        """
-        if self.integrations:
-            raise SimulationError(
-                "derivatives end where an integrator hands over to another one; take one alone "
-                "(integrator radau, where the scene is stiff)"
-            )
+        """As of ``RunState``: the integration is differentiated."""
+        is_first = not self.integrations
+        if is_first:
+            self._differentiation = Differentiation(1 + self._lanes)
         super().begin(integration)
-        self._differentiation = Differentiation(1 + self._lanes)
         integration.call = self._differentiation.call  # type: ignore[method-assign]
         integration.rows = self._rows  # type: ignore[method-assign]
-        self._seed()
+        if is_first:
+            self._seed()
         integration.compile()
         if integration.takes_programs:
             self.programs = self._programs()
         if self.jumps is not None:
-            law = type(self.jumps)
-            self.jumps.begin = self._jumping(law.begin)  # type: ignore
-            self.jumps.apply = self._jumping(law.apply)  # type: ignore
-            self._ending = EndingSlip(self, self._differentiation)
+            if is_first:
+                law = type(self.jumps)
+                self.jumps.begin = self._jumping(law.begin)  # type: ignore
+                self.jumps.apply = self._jumping(law.apply)  # type: ignore
+                self._ending = EndingSlip(self, self._differentiation)
             integration.advance = partial(self._ending.advance, integration)  # type: ignore
+
+    def observe_present(self) -> None:
+        """As of ``RunState``: one that goes on has the derivatives of the one before."""
+        super().observe_present()
+        if len(self.integrations) > 1:
+            before, work = self.integrations[-2].work, self.present.work
+            for argument in self.present.loop_arguments:
+                self._differentiation.wide(argument)
+            self._differentiation.take()
+            t = work.indices("real")["t"]
+            self._slopes_of(work.state[Y])[:] = self._slopes_of(before.state[Y])
+            self._slopes_of(work.real)[t] = self._slopes_of(before.real)[t]
 
     def _slopes_of(self, array: Floats) -> Floats:
         """(size, p) view of the derivatives of an array of the integration."""
@@ -150,9 +158,13 @@ class DifferentiatedRun(Run):
             given = np.append(work.state[Y], work.t)
             of_time = self._slopes_of(work.real)[work.indices("real")["t"]].copy()
             of_state = self._slopes_of(work.state)[: work.state.shape[1]].copy()
-            if (k := self._ended_slip(of)) >= 0:
-                of_state, of_time = self._to_end_of_slip(work.t), np.zeros_like(of_time)
-            if k >= 0 or (k := self._jumped_switch()) >= 0:
+            ended = self._ended_slip(of)
+            begun = self._ending.begun_at_once(work.t) if ended >= 0 else None
+            if begun is not None:
+                of_state, of_time = (slopes[..., : len(self.neighbours)] for slopes in begun)
+            elif (k := ended if ended >= 0 else self._jumped_switch()) >= 0:
+                if ended >= 0:
+                    of_state, of_time = self._to_end_of_slip(work.t), np.zeros_like(of_time)
                 rates = self._rates_before(put, given)
                 late = self._slopes_of_jump(k, put, rates, given, np.vstack([of_state, of_time]))
                 of_state, of_time = of_state + np.outer(rates, late), of_time + late
@@ -199,6 +211,11 @@ class DifferentiatedRun(Run):
         }
 
         def put(run: Run) -> None:
+            if run.present.implicit != self.present.implicit:
+                if len(run.integrations) == 1:
+                    switch_integrator(run)
+                else:
+                    run.integrations.reverse()
             arrays = dict(arrays_of(run))
             offset, j = self._offset_of(run)
             for name, array in present:

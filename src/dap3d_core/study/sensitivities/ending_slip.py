@@ -22,6 +22,8 @@ from dap3d_core.simulation.run import Run
 #: Most that a step is of the time left; part of the way at which the last one ends, from where
 #: slopes are extrapolated; states that are kept; steps that are taken at most.
 PART, NEAREST, KEPT, MOST_STEPS = 0.25, 1e-6, 256, 20_000
+#: Part of the time below which the way is none: its steps would be rounding of it.
+NO_WAY = 1e-9
 
 
 class EndingSlip:
@@ -57,6 +59,11 @@ class EndingSlip:
     def leads_to(self, t: float) -> bool:
         """True if a state before time t is known, from which slip has come."""
         return bool(self._states) and self._states[0][0] < t
+
+    def begun_at_once(self, t: float) -> tuple[Floats, Floats] | None:
+        """Slopes of state and time where the slip began that ends at time t, if it does at once."""
+        begun, _, slopes, of_time = self._states[0]
+        return (slopes, of_time) if t - begun <= NO_WAY * t else None
 
     def slopes(self, t: float) -> tuple[Floats, dict[float, Floats]]:
         """Slopes (n, lanes) of the state at time t, at which slip ends; of rows before, by time.
