@@ -13,7 +13,7 @@ import dap3d_core as dap
 from dap3d_core.formulations.pivots import store_reference_pivots
 from dap3d_core.formulations.programs import scene_program
 from dap3d_core.integrators import TABLEAUS, RungeKutta
-from dap3d_core.integrators.adams.integration import AdamsIntegration
+from dap3d_core.integrators.adams import AdamsIntegration
 from dap3d_core.integrators.stepping.integration import off_constraints
 from dap3d_core.kernels.compiler import objects
 from dap3d_core.simulation import CompiledModel

@@ -173,7 +173,7 @@ class PointCurve(Contact):
     All are smooth, and hollows and necks wider than a roller. With ``x`` that point of the whole
     curve counts which is nearest to P_i; from y = f(x) and polar ones the one next to where P_i is.
     Beyond the ends of a part nothing touches; what may touch at two points at once has a contact
-    for each part.
+    for each part, and is behind the curve by ``depth`` at most, as behind a thin wall.
 
         gap = distance of P_i from the curve - radius,   less than nothing on the other side
         gap = distance - radius_j - radius of a wire, radius_j - distance - radius in a pipe
@@ -196,11 +196,12 @@ class PointCurve(Contact):
     closed: bool = choice((False, True), False, doc="the same: it ends where it begins")
     radius_j: float = number(0.0, unit="m", minimum=0.0, doc="of a wire or pipe about it; with z")
     side: str = choice(("above", "below"), "above", doc="where P_i is; above: outside of a cam")
+    depth: float = number(None, unit="m", positive=True, doc="with y: how far behind it touches")
 
     def prepare(self, bodies):
         """The sign of the normal, and places of what the functions give."""
         s_max = self.s_min if self.s_max is None else self.s_max
-        own = {"s_max": s_max, "is_closed": float(self.closed)}
+        own = {"s_max": s_max, "is_closed": float(self.closed), "depth": self.depth or 0.0}
         sense = 1.0 if self.side == "above" else -1.0
         samples = [[0.0] * 4] * SAMPLES
         return {**super().prepare(bodies), **own, "sense": sense, "samples": samples}
@@ -219,6 +220,8 @@ class PointCurve(Contact):
             raise ValueError("s_min, s_max and closed are of a curve given by x and y")
         if "x" in functions and (self.s_max is None or self.polar):
             raise ValueError("a curve given by x and y takes s_max, its end, and is not polar")
+        if self.depth is not None and given != ["x", "y"]:
+            raise ValueError("depth is that behind a plane curve given by x and y")
         if self.radius_j and not in_space:
             raise ValueError("radius_j is that of a wire or pipe, a curve given by x, y and z")
         if "x" not in functions:
@@ -282,8 +285,8 @@ class InSpace(PointCurve, x=True, z=True):
         )
 
 
-class InPlane(PointCurve, x=True):
-    """The curve is x(s), y(s)."""
+class Wall(PointCurve, x=True, depth=True):
+    """The curve is x(s), y(s), and what is more than depth behind it does not touch."""
 
     def gap(
         r_P_i, r_P_j, A_j, radius, sense, samples, x, x_dot, x_ddot, y, y_dot, y_ddot
@@ -299,6 +302,23 @@ class InPlane(PointCurve, x=True):
     def normal(r_P_i, r_P_j, A_j, sense, samples, x, x_dot, x_ddot, y, y_dot, y_ddot):
         curve = parametric((x, x_dot, x_ddot), (y, y_dot, y_ddot))
         return rotate(A_j, at_plane_curve(r_P_i, r_P_j, A_j, sense, samples, curve)[1])
+
+    def reach(
+        r_P_i, r_P_j, A_j, radius, sense, samples, s_min, s_max, is_closed, depth,
+        x, x_dot, x_ddot, y, y_dot, y_ddot,
+    ):  # fmt: skip
+        curve = parametric((x, x_dot, x_ddot), (y, y_dot, y_ddot))
+        place, first = seen_from(r_P_i, r_P_j, A_j), [sample[:3] for sample in samples]
+        start = nearest_sample(first, place)
+        along = reach_of(*foot(place[:2], start, curve), s_min, s_max, is_closed)
+        within = nearest(place, start, sense, curve)[0] - radius + depth
+        return where(within < along, within, along)
+
+
+class InPlane(PointCurve, x=True):
+    """The curve is x(s), y(s)."""
+
+    gap, at, normal = Wall.gap, Wall.at, Wall.normal
 
     def reach(
         r_P_i, r_P_j, A_j, samples, s_min, s_max, is_closed, x, x_dot, x_ddot, y, y_dot, y_ddot

@@ -7,11 +7,11 @@ import multiprocessing
 import pickle
 import re
 import sys
-import threading
 
 import numpy as np
 import pytest
 from support.plain import jit_is_on
+from support.process import together
 
 import dap3d_core as dap
 
@@ -307,28 +307,6 @@ def test_numbers_changed_in_a_run_do_not_reach_a_run_inside_it(compiled, fresh):
 
 
 # ------------------------------------------------------------------ threads and processes
-
-
-def together(*jobs):
-    """Do jobs in threads at once; what each returned."""
-    results, errors = [None] * len(jobs), []
-    barrier = threading.Barrier(len(jobs))
-
-    def work(k):
-        try:
-            barrier.wait()
-            results[k] = jobs[k]()
-        except BaseException as error:  # whatever it is: it is raised where the test sees it
-            errors.append(error)
-
-    threads = [threading.Thread(target=work, args=(k,)) for k in range(len(jobs))]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    if errors:
-        raise errors[0]
-    return results
 
 
 def test_threads_may_run_one_compiled_model(compiled, fresh):

@@ -21,7 +21,7 @@ from support.studies import POINTS, bob, collected, same
 import dap3d_core as dap
 from dap3d_core.study import Ensemble, PointStatus
 from dap3d_core.study.workers import dask_cluster
-from dap3d_core.study.workers.environment import differences, environment_of, with_absolute_path
+from dap3d_core.study.workers.dask_cluster import differences, environment_of, with_absolute_path
 from dap3d_core.study.workers.threads import run_here
 
 pytestmark = [

@@ -63,9 +63,7 @@ def test_a_large_file_is_not_read(tmp_path):
         ("/etc/passwd", "outside of the folder"),
         ("file:///etc/passwd", "outside of the folder"),
         ("meshes/../../secret.obj", "outside of the folder"),
-        ("package://nowhere/../../secret.obj", "the package nowhere is not known"),
         ("package://p/../secret.obj", "outside of the folder"),
-        ("http://127.0.0.1:9/a.stl", "nothing is fetched"),
         ("link.obj", "outside of the folder"),
     ],
 )
@@ -81,6 +79,32 @@ def test_meshes_elsewhere_are_refused(tmp_path, uri, words):
     said = refusal(folder / "arm.urdf", text, packages={"p": package})
     assert words in said
     assert "arm.urdf:14: " in said
+
+
+@pytest.mark.parametrize(
+    ("uri", "words"),
+    [
+        ("package://nowhere/../../secret.obj", "the package nowhere is not known"),
+        ("package://link/secret.obj", "the package link is not known"),
+        ("package://below/secret.obj", "the package below is not known"),
+        ("http://127.0.0.1:9/a.stl", "nothing is fetched"),
+    ],
+)
+def test_meshes_of_unknown_places_are_left_out(tmp_path, uri, words):
+    """A link to a folder elsewhere, beside the file or further below, is no package."""
+    folder, secret = tmp_path / "model", tmp_path / "secret"
+    for place in (folder / "deep", secret):
+        place.mkdir(parents=True)
+    (secret / "secret.obj").write_text(CUBE)
+    if os.name == "posix":
+        (folder / "link").symlink_to(secret)
+        (folder / "deep" / "below").symlink_to(secret)
+    path = folder / "arm.urdf"
+    path.write_text(ARM.replace(BOX, f'<mesh filename="{uri}"/>'))
+    scene, report = dap.import_model(path)
+    [said] = [one.text for one in report.left_out if "its shape is not drawn" in one.text]
+    assert words in said
+    assert not scene.files
 
 
 def test_no_file_has_a_name_that_is_too_long(tmp_path):

@@ -21,7 +21,7 @@ from dap3d_core.formulations.contacts.contact_table import ContactTable
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.pivots import near_singular_rows, store_reference_pivots
 from dap3d_core.formulations.programs import change_over, scene_program
-from dap3d_core.integrators.adams import step as adams
+from dap3d_core.integrators import adams
 from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.radau.tableau import COEFFICIENTS, MOST_STAGES, STAGES, radau_method
 from dap3d_core.integrators.stepping.integration import Refusals, off_constraints
@@ -101,9 +101,9 @@ from dap3d_core.kernels.runtime.loop_modules import (
     unit_names,
 )
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P, unwound
+from dap3d_core.linear import rank
 from dap3d_core.linear.ldlt.factor import add_product, assemble, factor, scale_blocks, solve_saddle
 from dap3d_core.linear.ldlt.plan import make_plan
-from dap3d_core.linear.rank import rank
 from dap3d_core.model.rigid_motion import (
     Pose,
     adjoint,

@@ -1,8 +1,13 @@
-"""Python scripts run in fresh processes, with a cache folder of their own or that of the tests."""
+"""Python scripts run in fresh processes, with a cache folder of their own or that of the tests.
+
+And jobs that threads do at once.
+"""
 
 import os
 import subprocess
 import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 REPOSITORY = Path(__file__).parents[2]
@@ -40,3 +45,15 @@ def run(script, cache=UNOPTIMISED, *, cwd=None, timeout=300, **variables):
     out, err = process.communicate(timeout=timeout)
     assert process.returncode == 0, err
     return out.strip()
+
+
+def together(*jobs):
+    """Do jobs in threads at once; what each returned, or the error of the first that failed."""
+    barrier = threading.Barrier(len(jobs))
+
+    def work(job):
+        barrier.wait()
+        return job()
+
+    with ThreadPoolExecutor(len(jobs)) as pool:
+        return list(pool.map(work, jobs))

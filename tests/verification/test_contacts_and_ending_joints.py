@@ -152,3 +152,31 @@ def test_an_event_sets_velocities_beside_contacts():
     flown = 2.0 * 0.3 - 0.5 * g * 0.3**2
     assert result.r[-1, 0, 2] == pytest.approx(0.1 + flown, abs=1e-9)
     assert result.ledger["energy"].ok
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.5])
+def test_a_crane_picks_up_a_box_that_rests_on_its_corners(mu):
+    """A rope that is no shorter yet holds the box, too: rounding is all that presses on corners.
+
+    From t = 1 on the tension of the winch is weight and inertia of both.
+    """
+    scene = dap.Scene(name="crane")
+    scene.add_body("hook", mass=20.0, Jp=[0.1] * 3, r=[6.0, 0.0, 2.0])
+    scene.add_body("box", mass=400.0, Jp=[60.0] * 3, r=[6.0, 0.0, 0.5])
+    top = scene.add_point("top", "ground", [6.0, 0.0, 10.0])
+    lug = scene.add_point("lug", "box", [0.0, 0.0, 1.5])
+    scene.add_function("b", "wind", x_start=1.0, x_end=3.0, f_end=-2.0)
+    scene.add_joint("cable", "winch", points=[top, "hook.O"], function="wind")
+    scene.add_joint("sph", "grab", P_i="hook.O", P_j=lug, active="t > 0.5")
+    scene.add_contact("box_plane", "floor", body_i="box", size=[1.0, 1.0, 1.0], mu=mu)
+    scene.add_force("weight", "g")
+    result = dap.simulate(scene, t_end=2.0, dt=0.5)
+    assert not any(event.kind == "impact" for event in result.events)
+    u = np.clip((result.t - 1.0) / 2.0, 0.0, 1.0)
+    height = 2.0 * u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+    up = 2.0 * 60.0 * u * (1.0 - 3.0 * u + 2.0 * u**2) / 2.0**2
+    assert result.r[:, 1, 2] == pytest.approx(0.5 + height, abs=1e-9)
+    tension = np.abs(result.reaction("winch")["i"].force[:, 2])
+    lifted = result.t > 1.0
+    assert tension[lifted] == pytest.approx(420.0 * (g + up[lifted]), rel=1e-9)
+    assert tension[0] == pytest.approx(20.0 * g)

@@ -269,6 +269,27 @@ def add_lines(x, y, **fields):
     return add
 
 
+@pytest.mark.parametrize("depth", [{"depth": 0.05}, {}])
+def test_a_pin_passes_behind_a_wall_with_a_depth(depth):
+    """And another one bounces off its front; without it all behind a wall is in the way."""
+    scene = dap.Scene(name="wall")
+    for name, coeff in (("x", [0.0, 1.0, 0.0]), ("y", [0.0, 0.0, 0.0])):
+        scene.add_function("a", name, coeff=coeff)
+    for name, r, v in (("behind", [-0.5, -0.1, 0.0], [2.0, 0.0, 0.0]),
+                       ("front", [0.5, 0.3, 0.0], [0.0, -1.0, 0.0])):  # fmt: skip
+        scene.add_body(name, mass=1.0, Jp=[1.0] * 3, r=r, r_dot=v)
+        scene.add_contact("point_curve", f"of_{name}", P_i=f"{name}.O", radius=0.02, e=1.0,
+                          x="x", y="y", s_max=1.0, **depth)  # fmt: skip
+    if not depth:
+        with pytest.raises(dap.SimulationError, match=r"t = 0\.25 s: contact of_behind.*0\.12 m"):
+            dap.simulate(scene, t_end=1.0)
+        return
+    result = dap.simulate(scene, t_end=1.0, **TIGHT)
+    assert [event.name for event in result.events if event.kind == "impact"] == ["of_front"]
+    assert first(result, "impact").t == pytest.approx(0.28, abs=TOLERANCE)
+    assert result.r[-1, :, :2] == pytest.approx(np.array([[1.5, -0.1], [0.5, 0.74]]))
+
+
 @pytest.mark.slow
 def test_curves_that_are_none_are_refused():
     """With what is wrong, where, and what to do."""
@@ -297,3 +318,12 @@ def test_curves_that_are_none_are_refused():
     refused("takes s_max, its end", s_max=None)
     refused("by x and y, or by x, y and z; this one has x", y=None)
     refused("radius_j is that of a wire or pipe", radius_j=0.1)
+    refused(
+        "depth is that behind a plane curve",
+        x=None,
+        y=None,
+        function="x",
+        s_max=None,
+        closed=False,
+        depth=0.1,
+    )

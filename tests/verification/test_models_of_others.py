@@ -490,6 +490,14 @@ def test_a_double_pendulum_of_points_moves_as_its_closed_form(tmp_path, tiny, la
     assert result.ledger["energy"].ok
 
 
+def test_a_limit_of_urdf_without_bounds_is_none_and_says_so(tmp_path):
+    text = hinge("urdf", "-1", "1").replace('lower="-1" upper="1" ', "")
+    scene, report = imported(tmp_path, text, "urdf")
+    assert [force for force in scene.forces if force != "gravity"] == []
+    [said] = [one for one in report.translated if "<limit> without lower and upper" in one.text]
+    assert said.motion
+
+
 # --------------------------------------------------------------------------- files and names
 
 
@@ -505,6 +513,19 @@ def test_comments_may_hold_two_dashes(tmp_path, suffix):
         imported(tmp_path, f"{root}>{comments}\n\n\n</wrong>", suffix)
     with pytest.raises(dap.SceneError, match="document type"):
         imported(tmp_path, f"<!DOCTYPE a><!-- -- -->{text}", suffix)
+
+
+@pytest.mark.parametrize("before", ["\n", "<!-- by -->\n", "\n<!-- a -- b -->  <!-- c -->"])
+def test_a_declaration_may_come_after_blanks_and_comments(tmp_path, before):
+    text = hinge("urdf", "-1", "1")
+    late = f'{before}<?xml version="1.0"?>'
+    scene, _ = imported(tmp_path, f"{late}{text}", "urdf")
+    assert list(scene.bodies) == ["a"]
+    line = before.count("\n") + 2
+    with pytest.raises(dap.SceneError, match=rf":{line}: is not well-formed XML: mismatched tag"):
+        imported(tmp_path, f"{late}\n<robot></wrong>", "urdf")
+    with pytest.raises(dap.SceneError, match="XML or text declaration not at start of entity"):
+        imported(tmp_path, f"<robot>{late}</robot>", "urdf")
 
 
 NESTED = """<sdf version="1.9"><model name="outer">

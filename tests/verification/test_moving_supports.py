@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 
@@ -71,6 +73,35 @@ def test_steps_on_a_turntable_are_of_second_order():
         errors.append(np.max(np.abs(result.r[:, 1, :2] - path(result.t))))
     assert errors[0] < 1e-4
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05)
+
+
+@long_in_plain_python
+def test_slip_that_begins_with_a_run_is_not_a_step_late():
+    """A point laid down on a turntable too fast for its friction, against scipy in the plane.
+
+    By rows of the beginning the first step held it: mu g h too fast from then on, 7.6e-4 m at 4 ms.
+    """
+    rate, mu, x = 2.0, 0.1, 0.3
+
+    def rates(t, y):
+        slip = y[2:] - rate * np.array([-y[1], y[0]])
+        size = np.linalg.norm(slip)  # none at first, when it begins outwards
+        return [*y[2:], *(-mu * G * (slip / size if size > 0.0 else np.array([1.0, 0.0])))]
+
+    path = solve_ivp(rates, (0.0, 0.2), [x, 0.0, 0.0, rate * x], rtol=1e-10, atol=1e-12).y[:2, -1]
+    turn = {"type": "a", "coeff": [0.0, rate, 0.0]}
+    scene = table("drive-rot", "ground.z", turn, {"w": [0.0, 0.0, rate]})
+    scene.add_body("point", mass=1.0, Jp=[0.1] * 3, r=[x, 0.0, 0.0], r_dot=[0.0, rate * x, 0.0])
+    scene.add_contact("ball_plane", "c", P_i="point.O", radius=0.0, P_j="table.O",
+                      a_j="table.z", mu=mu)  # fmt: skip
+    errors = []
+    for h in (4e-3, 2e-3):
+        result = dap.simulate(scene, t_end=0.2, dt=0.2, contact="stepping", contact_step=h)
+        errors.append(np.max(np.abs(result.r[-1, 1, :2] - path)))
+    assert errors[0] < 1e-5
+    assert errors[1] < 0.4 * errors[0]  # nearly of second order, of first it is a half
+    exact = dap.simulate(scene, t_end=0.2, **{**TIGHT, "dt": 0.2})
+    np.testing.assert_allclose(exact.r[-1, 1, :2], path, rtol=0.0, atol=TOLERANCE)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -154,3 +185,18 @@ def test_joints_and_overlaps_are_corrected_together():
     result = dap.simulate(scene, t_end=0.5, dt=0.1, contact_step=1e-3)
     assert len(result.contacts) > 0
     assert result.record.stepping["deepest"] < 1e-9
+
+
+@pytest.mark.parametrize("start", [0.5, 0.7])
+@pytest.mark.parametrize("integrator", ["dop853", "radau"])
+def test_no_report_on_a_break_point_pulls(integrator, start):
+    """A table that falls faster than g from then on leaves its load; 7 * 0.1 is a bit above 0.7."""
+    down = {"type": "step", "x_start": start, "x_end": start + 0.4, "f_end": -1.0}
+    scene = table("drive-tran", "ground.z", down, {})
+    scene.add_body("load", mass=2.0, Jp=[0.1] * 3, r=[0.0, 0.0, 0.1])
+    scene.add_contact("ball_plane", "c", P_i="load.O", radius=0.1, P_j="table.O", a_j="table.z")
+    result = dap.simulate(scene, t_end=start + 0.2, dt=0.1, integrator=integrator)
+    before = result.t < start + 1e-12
+    assert result.events[-1].kind == "lift"
+    assert result.contact("c").normal_force == pytest.approx(np.where(before, 2.0 * G, 0.0))
+    assert result.rdd[:, 1, 2] == pytest.approx(np.where(before, 0.0, -G), abs=1e-12)

@@ -19,6 +19,21 @@ def test_a_later_option_keeps_gravity(tmp_path):
     assert scene.forces["gravity"].fields["gravity"] == 1.6
 
 
+NAMED = """<default class="arm"><geom density="%d"/>
+<default class="light"><geom density="100"/></default></default>%s<worldbody>
+<body name="a" childclass="arm"><joint/><geom size="1"/></body><body name="b"><joint/>
+<geom size="1"/></body><body name="c"><joint/><geom size="1" class="light"/></body></worldbody>"""
+
+
+def test_the_outermost_default_class_may_have_a_name(tmp_path):
+    """It is that of all elements, as in MuJoCo 2.3.7, which gives these masses; of two none is."""
+    scene, _ = imported(tmp_path / "a.xml", NAMED % (500, ""))
+    masses = [scene.bodies[name].mass * 0.75 / np.pi for name in "abc"]
+    np.testing.assert_allclose(masses, [500.0, 500.0, 100.0], rtol=1e-15)
+    with pytest.raises(dap.SceneError, match="outermost default classes arm, leg are one, main"):
+        imported(tmp_path / "a.xml", NAMED % (500, '<default class="leg"/>'))
+
+
 BALLS = """<worldbody><site name="top" pos="0 0 2"/><site name="low" pos="0 0 1"/>
 <replicate count="3" offset="1 0 0">
 <body name="ball"><joint name="x" type="slide" axis="1 0 0"/><geom size="0.1"/>

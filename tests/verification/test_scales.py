@@ -418,3 +418,107 @@ def test_friction_of_hinges_does_not_depend_on_the_size_of_what_turns(make, leng
     assert (metres.contact("rub").mode == 1).all()
     assert [event.kind for event in other.events] == [event.kind for event in metres.events]
     assert other.r / length == pytest.approx(metres.r, abs=1e-9)
+
+
+class Units:
+    """Of length, time and mass, in m, s and kg, and those that follow."""
+
+    def __init__(self, m=1.0, s=1.0, kg=1.0):
+        self.m, self.s, self.kg = m, s, kg
+        self.speed, self.inertia, self.force = m / s, kg * m**2, kg * m / s**2
+
+    def block(self, name, mass, r, **moving):
+        """A scene with a block of 0.1 m and that mass."""
+        scene = dap.Scene(name=name)
+        scene.add_body("block", mass=mass * self.kg, Jp=[0.01 * self.inertia] * 3,
+                       r=(np.array(r) * self.m).tolist(), **moving)  # fmt: skip
+        return scene
+
+    def weigh(self, scene):
+        scene.add_force("weight", "gravity", gravity=GRAVITY * self.m / self.s**2)
+
+
+def dragged_block(u):
+    """A block that a spring drags along, whose far end a driver moves: it sticks and slips."""
+    scene = u.block("dragged", 1.0, [0.0, 0.0, 0.05])
+    u.weigh(scene)
+    scene.add_contact("ball_plane", "floor", P_i="block.O", radius=0.05 * u.m, mu=0.3, mu_s=0.4)
+    scene.add_joint("parallel", "upright", a_i="block.z", a_j="ground.z")
+    scene.add_body("end", mass=u.kg, Jp=[0.01 * u.inertia] * 3, r=[0.5 * u.m, 0.0, 0.05 * u.m],
+                   r_dot=[0.3 * u.speed, 0.0, 0.0])  # fmt: skip
+    scene.add_joint("tran", "rail", P_i="end.O", P_j="ground.O", a_j="ground.x")
+    scene.add_function("a", "way", coeff=[0.0, 0.3 * u.speed, 0.0])
+    scene.add_joint("drive-tran", "drive", P_i="end.O", P_j="ground.O", a_j="ground.x",
+                    function="way")  # fmt: skip
+    scene.add_force("ptp", "spring", P_i="block.O", P_j="end.O", k=60.0 * u.force / u.m,
+                    l0=0.5 * u.m)  # fmt: skip
+    return scene
+
+
+def twisted_block(u):
+    """A block on a hinge that holds it at first: nothing moves, and no force acts."""
+    scene = u.block("twisted", 1.0, [0.0, 0.0, 0.0])
+    scene.add_joint("rev", "pin", P_i="block.O", P_j="ground.O", a_i="block.z", a_j="ground.z")
+    scene.add_function("harmonic", "f", amplitude=0.06 * u.force * u.m, frequency=3.0 / u.s)
+    scene.add_force("motor", "twist", joint="pin", torque="f")
+    scene.add_force("rot_friction", "rub", joint="pin", n_c=0.02 * u.force * u.m,
+                    n_s=0.025 * u.force * u.m)  # fmt: skip
+    return scene
+
+
+def ball_on_hill(u):
+    """A ball that rolls down a sphere, slips, and lifts off."""
+    scene = u.block("hill", 1.0, [0.12, 0.0, np.sqrt(1.21 - 0.0144)])
+    u.weigh(scene)
+    scene.add_contact("ball_ball", "hill", P_i="block.O", radius_i=0.1 * u.m, P_j="ground.O",
+                      radius_j=u.m, mu=0.3)  # fmt: skip
+    return scene
+
+
+@pytest.mark.parametrize(
+    "units", [(1.0, 1e4, 1.0), (1e-4, 1e4, 1e-4), (1e-5, 1e-3, 1e-9), (1e4, 1e3, 1e4)]
+)
+@pytest.mark.parametrize("make", [dragged_block, twisted_block, ball_on_hill])
+def test_slow_motions_and_quick_ones_are_those_of_ordinary_scenes(make, units):
+    """Events and states in any units of length, time and mass.
+
+    At rtol 1e-10 some 100 steps leave 1e-8. Limits in m/s, N or rad/s of what moves by
+    1e-4 m/s have it slip 1e-4 to 6e-3 of its time late; default tolerances in them lose
+    four digits of its speeds."""
+
+    def run(u):
+        return dap.simulate(make(u), t_end=1.5 * u.s, dt=0.1 * u.s, rtol=1e-10)
+
+    u = Units(*units)
+    ours, theirs = run(u), run(Units())
+    assert [(e.kind, e.name) for e in ours.events] == [(e.kind, e.name) for e in theirs.events]
+    assert "slip" in {e.kind for e in theirs.events}
+    np.testing.assert_allclose(
+        [e.t / u.s for e in ours.events], [e.t for e in theirs.events], atol=1e-8
+    )
+    assert all(entry.ok for entry in ours.ledger.values()), ours.ledger
+    np.testing.assert_allclose(ours.r / u.m, theirs.r, atol=1e-8)
+    np.testing.assert_allclose(ours.rd / u.speed, theirs.rd, atol=1e-8)
+    np.testing.assert_allclose(ours.w * u.s, theirs.w, atol=1e-7)
+
+
+@pytest.mark.parametrize("length", [1e-4, 1e4])
+def test_rates_of_a_motion_that_is_given_do_not_depend_on_its_size(length):
+    """A rod on a hinge by positions of its middle: what splines make of these is the same.
+
+    They are off by 1e-3; rounding of second derivatives is some 1e-12."""
+
+    def accelerations(m):
+        u = Units(m)
+        scene = u.block("rod", 1.0, [0.5, 0.0, 0.0])
+        scene.add_point("end", "block", [-0.5 * m, 0.0, 0.0])
+        scene.add_joint("rev", "pin", P_i="end", P_j="ground.O", a_i="block.y", a_j="ground.y")
+        scene.add_function("harmonic", "f", amplitude=0.5, frequency=2.0)
+        scene.add_joint("motor", "motor", joint="pin", position="f")
+        t = np.linspace(0.0, 2.0, 41)
+        angle = 0.4 * np.sin(2.0 * t)
+        motion = {"t": t, "block.r.x": 0.5 * m * np.cos(angle),
+                  "block.r.z": -0.5 * m * np.sin(angle)}  # fmt: skip
+        return dap.inverse(scene, motion).rdd / m
+
+    np.testing.assert_allclose(accelerations(length), accelerations(1.0), atol=1e-10)

@@ -141,3 +141,15 @@ def test_friction_beside_a_damper_is_of_second_order():
         errors.append(abs(run.r[-1, 0, 0] - x))
     assert errors[0] < 1e-3
     assert all(3.8 < one / half < 4.2 for one, half in pairwise(errors))
+
+
+@pytest.mark.parametrize("contact", ["stepping", "events"])
+def test_a_run_that_begins_where_another_ended_rubs_once(contact):
+    """w = w_0 - n_c t / J; what was said to slide had its own force besides the impulse."""
+    scene, J, n_c, start = dap.Scene(name="hinge"), 0.3, 0.4, 2.0
+    scene.add_body("wheel", mass=2.0, Jp=[0.5, 0.5, J], w=[0.0, 0.0, start])
+    scene.add_joint("rev", "axle", P_i="wheel.O", P_j="ground.O", a_i="wheel.z", a_j="ground.z")
+    scene.add_force("rot_friction", "rub", joint="axle", n_c=n_c)
+    half = dap.simulate(scene, t_end=0.4, dt=0.4, contact=contact)
+    result = dap.simulate(scene, start=half, t_end=0.4, dt=0.4, contact="stepping")
+    assert result.w[-1, 0, 2] == pytest.approx(start - 0.8 * n_c / J, rel=1e-9)

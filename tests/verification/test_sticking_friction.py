@@ -133,3 +133,24 @@ def test_what_sticks_holds_no_less_than_what_slides():
     scene.add_force("rot_friction", "rub", joint="axle", n_c=0.4, n_s=0.3)
     with pytest.raises(dap.SceneError, match=r"forces\.rub: n_s = 0\.3 is less than n_c = 0\.4"):
         dap.simulate(scene, t_end=0.1)
+
+
+@pytest.mark.parametrize(("first", "second"), [(1.0, 0.02), (0.1, 0.3), (0.02, 1.0)])
+def test_gears_on_hinges_that_rub_come_to_rest(first, second):
+    """I w_dot = -n of the first, from 8 rad/s: 0.02 + 0.02 / 4 kg m^2, first + second / 2 N m.
+
+    Both stop at once. What they had then, 1e-46 rad/s^2 that no friction of gears in mesh could
+    give, had no solution, and runs ended as a jam.
+    """
+    scene = dap.Scene(name="gears")
+    for k, (x, w) in enumerate(((0.0, 8.0), (0.3, -4.0))):
+        scene.add_body(f"g{k}", mass=1.0, Jp=[0.01, 0.02, 0.01], r=[x, 0.0, 0.0], w=[0.0, w, 0.0])
+        scene.add_point(f"p{k}", "ground", [x, 0.0, 0.0])
+        scene.add_joint("rev", f"h{k}", P_i=f"g{k}.O", P_j=f"p{k}", a_i=f"g{k}.y", a_j="ground.y")
+        scene.add_force("rot_friction", f"rub{k}", joint=f"h{k}", n_c=(first, second)[k])
+    scene.add_joint("gear", "mesh", joint_i="h0", joint_j="h1", radius_i=0.1, radius_j=0.2)
+    result = dap.simulate(scene, t_end=1.0, dt=0.5)
+    stops = 8.0 * 0.025 / (first + 0.5 * second)
+    assert [event.kind for event in result.events] == ["stick", "stick"]
+    assert [event.t for event in result.events] == pytest.approx([stops] * 2, rel=0, abs=1e-9)
+    assert np.abs(result.w[-1]).max() < 1e-12

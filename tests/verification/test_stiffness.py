@@ -55,6 +55,20 @@ def test_a_motion_that_decays_is_not_stiff_while_it_lasts():
     assert not stiffness(result)
 
 
+def test_slip_that_turns_while_it_vanishes_does_not_make_a_rolling_top_stiff():
+    """It does until the top rolls; from there on dop853 takes a fifth of the steps of radau."""
+    axis = np.array([np.sin(0.1), 0.0, np.cos(0.1)])
+    scene = dap.Scene(name="tippe top")
+    scene.add_body("top", mass=0.015, Jp=(2.2e-6, 2.2e-6, 2.5e-6), rpy=(0.0, 0.1, 0.0),
+                   r=[0.0, 0.0, 0.02] - 0.003 * axis, w=150.0 * axis)  # fmt: skip
+    scene.add_point("centre", "top", (0.0, 0.0, 0.003))
+    scene.add_force("weight")
+    scene.add_contact("ball_plane", "table", P_i="centre", radius=0.02, mu=0.3)
+    result = dap.simulate(scene, t_end=1.0, dt=0.05, rtol=1e-10, atol=1e-12)
+    assert [event.kind for event in result.events] == ["touch", "stick"]
+    assert not stiffness(result)
+
+
 @pytest.mark.slow
 def test_auto_takes_the_steps_of_radau(governor):
     """Every reporting time once, the digits of the reference, the steps of radau but for the start;

@@ -33,7 +33,7 @@ INTEGRATOR_MODULES = {
     "dop853": "dap3d_core.integrators.runge_kutta.dop853",
     "dopri5": "dap3d_core.integrators.runge_kutta.dopri5",
     "rk4": "dap3d_core.integrators.runge_kutta.rk4",
-    "adams": "dap3d_core.integrators.adams.step",
+    "adams": "dap3d_core.integrators.adams",
     "radau": "dap3d_core.integrators.radau.step",
     "moreau": "dap3d_core.integrators.moreau.integration",
 }

@@ -69,7 +69,18 @@ class Settings:
         settings = cls(XmlElement("compiler", given, place), folder)
         for element in root.all("default"):
             settings._read_defaults(element, "main", {})
+        settings._name_main(root.all("default"))
         return settings
+
+    def _name_main(self, outermost: list[XmlElement]) -> None:
+        """Know the class of all elements by the name that it has in files for MuJoCo 2, too."""
+        named = {element.get("class") or "main": element for element in outermost}
+        named.pop("main", None)
+        for name, element in named.items():
+            if len(named) > 1:
+                what = f"the outermost default classes {', '.join(named)} are one, main"
+                raise FormatError(what, element.place, "put them into a <default>")
+            self.defaults.setdefault(name, self.defaults["main"])
 
     def _read_defaults(
         self, element: XmlElement, name: str, inherited: dict[str, dict[str, str]]

@@ -1,5 +1,6 @@
 """Reads links, frames, nested and included models of SDF."""
 
+import re
 from collections.abc import Sequence
 from itertools import chain, combinations
 from typing import Any
@@ -14,22 +15,40 @@ from dap3d_core.interface.formats import (
     Inertial,
     Joint,
     Link,
+    Place,
     Remarks,
     Source,
     XmlElement,
     from_quaternion,
+    inertia_moved,
+    inertia_of_mesh,
+    inertia_of_solid,
     rpy,
+    total_inertia,
 )
 from dap3d_formats.axes import along
 from dap3d_formats.element_table import note_elements
 from dap3d_formats.sdf.elements import CONTACTS, SDF
 from dap3d_formats.sdf.frames import FrameGraph
+from dap3d_formats.sdf.versions import update, version_of
 from dap3d_formats.shapes import SIZES, add_shapes, hexadecimal
 
 #: Speed below which nothing bounces from which on nothing ever does, m/s: the default is 1e5.
 FAST = 1e3
+#: Kinds of solids, and names of their sizes.
+SOLIDS = SIZES | {"ellipsoid": {"radii": 3}}
+#: Density of collisions of which none is given, kg/m^3.
+WATER = 1000.0
+#: The address of a model on Gazebo's server; its name.
+SERVED = re.compile(r"https?://fuel\.[^/]+/[^/]+/[^/]+/models/([^/]+)(?:/\w+)?")
 #: What a link may hold.
 CONTENTS = ("inertial", "visual", "collision")
+
+
+class MergedScope(str):
+    """The scope of a model that is merged into the one around it, of its own frame alone."""
+
+    frame: str
 
 
 class SdfReader:
@@ -37,7 +56,6 @@ class SdfReader:
 
     def __init__(self, source: Source, root: XmlElement) -> None:
         self.source, self.root, self.remarks = source, root, source.remarks
-        _check_version(root)
         self.frames = FrameGraph()
         self.model = Articulation(source.path.stem, gravity=(0.0, 0.0, -9.8), fixed_base=False,
                                   coefficient_of_pair=min, place=root.place)  # fmt: skip
@@ -47,7 +65,7 @@ class SdfReader:
 
     def read_links(self) -> None:
         """Read links and frames; joints are gathered in ``elements``."""
-        note_elements(self.root, CONTACTS if self.source.contacts else SDF, self.remarks)
+        self._prepare(self.root)
         self.frames.add(WORLD, "", Frame(), self.root.place)
         world = self.root.first("world")
         holder = self.root if world is None else world
@@ -74,6 +92,11 @@ class SdfReader:
                 pose = self.frames.in_world(name, link.place)
                 self.model.joints[name] = Joint(name, "fixed", WORLD, name, pose, place=link.place)
 
+    def _prepare(self, root: XmlElement) -> None:
+        """Bring a file to the newest version, and remark what of it is left out."""
+        update(root, self.remarks)
+        note_elements(root, CONTACTS if self.source.contacts else SDF, self.remarks)
+
     def finish(self) -> Articulation:
         """The model; links that no joint places are where the file has them."""
         if not self.model.links:
@@ -87,10 +110,12 @@ class SdfReader:
         name = text_of(element, "uri")
         if not name:
             raise FormatError("<include> has no <uri>; it is required", element.place)
-        file = name if name.endswith((".sdf", ".world")) else f"{name.rstrip('/')}/model.sdf"
+        file = self._file_of(name.rstrip("/"), element.place)
         root = self.source.include(file, element.place)
-        note_elements(root, CONTACTS if self.source.contacts else SDF, self.remarks)
+        self._prepare(root)
         inner = root.first("model")
+        if inner is None and (root.first("light") or root.first("actor")):
+            return  # remarked
         if inner is None:
             raise FormatError(f"{name} holds no <model>", element.place)
         given = element.first("name")
@@ -99,8 +124,33 @@ class SdfReader:
             child = element.first(tag)
             if child is not None:
                 inner.children = [c for c in inner.children if c.name != tag] + [child]
+        scope = scoped(outer or "", called) if scope is None else scope
+        if outer is not None and element.get("merge") in ("true", "1"):
+            scope = MergedScope(outer)
+            scope.frame = f"_merged__{called}__model__"
         with self.source.including(file):
-            self._model(inner, outer, scoped(outer or "", called) if scope is None else scope)
+            self._model(inner, outer, scope)
+
+    def _file_of(self, uri: str, place: Place) -> str:
+        """The file of a model that is named by its file, its folder, or its name alone.
+
+        A name is that of a folder which is found as packages are; so is a model of Gazebo's server.
+        """
+        served = SERVED.fullmatch(uri)
+        name = served[1] if served else uri.removeprefix("file://")
+        folders = [] if served else [uri]
+        if "://" not in name:
+            folders.append(f"model://{name}")
+        for folder in folders:
+            if self.source.has(folder):
+                return folder
+            if self.source.has(config := f"{folder}/model.config"):
+                named = self.source.include(config, place).all("sdf")
+                if named:
+                    return f"{folder}/{max(named, key=version_of).text.strip()}"
+            if self.source.has(file := f"{folder}/model.sdf"):
+                return file
+        return folders[0] if folders[0].endswith((".sdf", ".world")) else f"{folders[0]}/model.sdf"
 
     def _model(self, element: XmlElement, outer: str | None, scope: str) -> None:
         """A model, whose names begin with its scope; outer: that of the model around, if any."""
@@ -111,10 +161,12 @@ class SdfReader:
         placement = element.get("placement_frame") or text_of(element, "placement_frame")
         self.frames.add(inner, parent, pose, element.place,
                         placement=scoped(scope, placement) if placement else "")  # fmt: skip
-        if scope:  # the name of a model is that of its frame
+        merged = isinstance(scope, MergedScope)
+        if scope and not merged:  # the name of a model is that of its frame
             self.frames.add(scope, inner, Frame(), element.place)
             self.frames.attached[scope] = inner
-        if canonical := element.get("canonical_link"):
+        links = [link.get("name", "") for link in element.all("link")] if merged else []
+        if canonical := element.get("canonical_link") or next(iter(links), ""):
             self.frames.attached[inner] = scoped(scope, canonical)
         before = len(self.model.links)
         for child in element.all("link"):
@@ -130,7 +182,7 @@ class SdfReader:
         if outer is None and not is_true(element, "self_collide"):
             alone = [n for n in list(self.model.links)[before:] if n not in self.self_collide]
             self.model.excluded += combinations(alone, 2)
-        if is_true(element, "static"):
+        if is_true(element, "static") and not merged:
             self.remarks.translate(element.place, "a static model is a part of ground")
             self.static.append(scoped(scope, ""))
 
@@ -163,6 +215,8 @@ class SdfReader:
         self.frames.add(name, scoped(scope, relative or "__model__"), pose, element.place)
         link = Link(name, place=element.place)
         link.inertial = self._inertial(element)
+        if text_of(element, "gravity") in ("false", "0"):
+            link.gravcomp = 1.0
         if is_true(element, "self_collide"):
             self.self_collide.add(name)
         add_shapes(link, element, self.source, self._geometry)
@@ -175,7 +229,7 @@ class SdfReader:
             self.remarks.translate(link.place, "a link without <inertial> has 1 kg and 1 kg m^2")
             return Inertial(1.0, inertia=[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
         if element.get("auto") in ("true", "1"):
-            raise FormatError('<inertial auto="true">: give mass and inertia', element.place)
+            return self._computed_inertial(link, element)
         mass, inertia = element.first("mass"), element.first("inertia")
         pose, _ = self.pose(element)
         usual = {"ixx": 1.0, "iyy": 1.0, "izz": 1.0, "ixy": 0.0, "ixz": 0.0, "iyz": 0.0}
@@ -185,6 +239,34 @@ class SdfReader:
         return Inertial(
             1.0 if mass is None else mass.content(1)[0], pose.r, pose.A @ rows @ pose.A.T
         )
+
+    def _computed_inertial(self, link: XmlElement, element: XmlElement) -> Inertial:
+        """The inertial of the volumes of a link's collisions, with its mass where that is given."""
+        usual, parts = numbers(element, "density", 1, (WATER,)), []
+        for collision in link.all("collision"):
+            shape = next(iter(collision.first("geometry") or ()), None)
+            if shape is None:
+                continue
+            com: Any = (0.0, 0.0, 0.0)
+            if shape.name in SOLIDS:
+                volume, unit_inertia = inertia_of_solid(shape.name, _sizes(shape))
+            elif shape.name == "mesh":
+                path = self.source.locate(text_of(shape, "uri"), shape.place, required=True)
+                assert path is not None
+                vertices, triangles = self.source.mesh(path, shape.place)
+                scale = numbers(shape, "scale", 3, (1.0, 1.0, 1.0))
+                volume, com, unit_inertia = inertia_of_mesh(vertices * scale, triangles)
+            else:
+                what = f"the mass of a <{shape.name}> is not computed"
+                raise FormatError(what, shape.place, "give mass and inertia to its link")
+            mass = abs(volume) * numbers(collision, "density", 1, usual)[0]
+            part = Inertial(mass, com, mass * unit_inertia)
+            parts.append(inertia_moved(part, self.pose(collision)[0]))
+        total = total_inertia(parts) if parts else Inertial(0.0)
+        if not total.mass > 0.0:
+            raise FormatError('<inertial auto="true"> of a link without a volume', element.place)
+        ratio = numbers(element, "mass", 1, (total.mass,))[0] / total.mass
+        return Inertial(ratio * total.mass, total.com, ratio * total.inertia)
 
     def _geometry(
         self, element: XmlElement, shape: XmlElement | None, collision: bool
@@ -196,10 +278,8 @@ class SdfReader:
         common["color"] = _color(element.first("material"))
         if collision and self.source.contacts:
             common["contact"] = _contact(element, self.remarks)
-        sizes = SIZES | {"ellipsoid": {"radii": 3}}
-        if shape.name in sizes:
-            size = [numbers(shape, *one) for one in sizes[shape.name].items()]
-            return Geometry(shape.name, tuple(chain(*size)), **common)
+        if shape.name in SOLIDS:
+            return Geometry(shape.name, _sizes(shape), **common)
         if shape.name == "mesh":
             path = self.source.locate(text_of(shape, "uri"), shape.place)
             scale = numbers(shape, "scale", 3, (1.0, 1.0, 1.0))
@@ -228,6 +308,8 @@ class SdfReader:
 
 def scoped(scope: str, name: str) -> str:
     """A name within a model."""
+    if name == "__model__":
+        name = getattr(scope, "frame", name)
     return name if name == WORLD or not scope else f"{scope}::{name}"
 
 
@@ -264,12 +346,8 @@ def numbers(
     return child.content(count)
 
 
-def _check_version(root: XmlElement) -> None:
-    """Refuse a version of the format that is no numbers, as 1.7 is."""
-    try:
-        [int(part) for part in (root.get("version") or "1.7").split(".")]
-    except ValueError:
-        raise FormatError(f"version {root.get('version')!r} is no version", root.place) from None
+def _sizes(shape: XmlElement) -> tuple[float, ...]:
+    return tuple(chain(*(numbers(shape, *one) for one in SOLIDS[shape.name].items())))
 
 
 def _contact(collision: XmlElement, remarks: Remarks) -> Contact:

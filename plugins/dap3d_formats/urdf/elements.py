@@ -41,6 +41,8 @@ URDF: Table = {
     "safety_controller": noted("", "limits of a controller"),
     "constraint": translated("", "a joint that closes a loop") | taken("name type"),
     "child_origin": taken("xyz rpy"),
+    "loop_joint": moves("", "closes a loop; <constraint> is read"),
+    "drake:joint": moves("", "types of Drake; its links hang from nothing"),
     "transmission": moves("", "motors and gears; add forces of your own"),
     "gazebo": noted("", "settings of a simulator"),
     "ros2_control": noted("", "settings of a controller"),

@@ -178,6 +178,8 @@ class UrdfReader:
             lower, upper = (limit.number(key, 0.0, unbounded=True) for key in ("lower", "upper"))
             if lower == upper == 0.0 and "lower" not in limit.attributes:
                 lower, upper = -inf, inf
+                text = "a <limit> without lower and upper is none, as in MuJoCo; by the format, 0"
+                self.remarks.translate(limit.place, text, motion=True)
             joint.limits = (Limits.between(lower, upper, joint.name, limit.place),)
         mimic = element.first("mimic")
         if mimic is not None:

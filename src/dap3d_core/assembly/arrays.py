@@ -42,6 +42,10 @@ ENDS, BEGINS, UNSEEN, SEAM, JUMPS, MODE_ENDS = 1, 0, -1, -2, 2, 3
     DOUBTFUL, JAMS, WEAK, SETTINGS
 ) = range(14)  # fmt: skip
 
+#: Of a contact, the column of its first state, its mode, in ``contacts``; behind which stands,
+#: after its direction of sliding, what it is given of what contacts share.
+FIRST_STATE, SHARE = 6, 4
+
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
 class KeptRowArrays(Arrays):

@@ -39,7 +39,7 @@ from dap3d_core.assembly.turns import (
 from dap3d_core.formulations import ACCEPTED, FORMULATIONS, REPORT, RHS, WATCH, arrays
 from dap3d_core.formulations.constraint_rows import ConstraintRows, jacobian_pattern, scaled_rows
 from dap3d_core.formulations.coordinates import Coordinates
-from dap3d_core.formulations.switches import Switch, switches_of
+from dap3d_core.formulations.switches import Switch, switches_of, turns
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH
 from dap3d_core.interface.element_states import START
 from dap3d_core.linear.ldlt.plan import Plan, make_plan
@@ -61,6 +61,7 @@ class Evaluator:
         formulation: its properties.
         report_size: numbers that ``report`` writes (formulations/standard.py).
         states: (states,) of elements, in evaluations at a state u of the bodies alone.
+        time: s, that tolerances speak of (``Model.time``).
     """
 
     model: Model
@@ -137,7 +138,7 @@ class Evaluator:
     @cached_property
     def switches(self) -> tuple[Switch, ...]:
         """The switches of the model's elements, in the order in which ``watch`` gives them."""
-        return switches_of(self.loop_groups, self.model.length, self.model.reach)
+        return switches_of(self.loop_groups, self.model.length, self.time, self.model.reach)
 
     @property
     def friction_failure_count(self) -> int:
@@ -430,12 +431,24 @@ class Evaluator:
         """
         model = self.model
         self.system.weight[:] = 1.0
+        self.time = model.time(lambda t: self.applied_forces(t, model.u0))
+        self._weigh_forces()
         if model.length != 1.0 and model.row_count:
             gradients = scaled_rows(self.rows(0.0, model.u0), model.length)[1]
             good = np.where(np.isfinite(gradients), gradients, 1.0)
             self.system.weight[self.system.row] = model.length / good
         if model.iterated_forces and model.row_count:
             self._weigh_multipliers()
+
+    def _weigh_forces(self) -> None:
+        """Put the time of the scene into what contacts measure forces by: their rest is a speed."""
+        for q, (kind, group) in enumerate(self.loop_groups):
+            if kind == "switch" and group.type_info.type.is_contact:
+                layout, p0 = group.type_info.layout, int(self.system.groups[q, 1])
+                first = p0 + layout.numbers["unit_mass"][0]
+                arm = self.model.length if turns(group) else 1.0  # of a moment
+                places = slice(first, p0 + layout.par_width * group.count, layout.par_width)
+                self.system.par[places] *= arm * arm / self.time
 
     def _weigh_multipliers(self) -> None:
         """Weights of multipliers, by which those of least lambda . w lambda are a choice.

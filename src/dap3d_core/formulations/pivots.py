@@ -55,7 +55,7 @@ def pivots(evaluator: Evaluator, t: float) -> Floats:
         linearise,
         linearise_evenly,
     )
-    from dap3d_core.linear.rank.null_space import inverse_pivots
+    from dap3d_core.linear.rank import inverse_pivots
 
     system = evaluator.system
     place = linearise_evenly if system.settings[EVEN] else linearise

@@ -16,7 +16,7 @@ JUMPING = frozenset(("impulse", "reset"))
 #: Bodies that touch are apart, or not, by the rounding of their positions: this part of the length
 #: of the scene, or of how far bodies are from the origin (``Model.reach``), is some of them.
 POSITION_ROUNDING = 32.0 * float(np.finfo(float).eps)
-#: Slip, m/s of a scene of that size, and the rest of a cone, N, that are rounding of contacts that
+#: Slip, m/s of an ordinary scene, and the rest of a cone, N, that are rounding of contacts that
 #: begin to slip, or to stick.
 STILL = 1e-11
 #: The part of the narrowest range between two knots that counts as at the knot.
@@ -33,8 +33,9 @@ class Switch:
             function that the element is given takes another form; "bound": that of an unknown of
             the element from its bound.
         is_one_of_several, part: where the kernel gives a tuple, which of its numbers.
-        length: of the scene, m (Model.length); 1 rad of a contact whose gap or slip is an angle.
-        reach: the length, m, of which positions have the rounding; the same.
+        speed: length over time of the scene, m/s (Model.length, Evaluator.time); that of 1 rad of a
+            contact whose gap or slip is an angle.
+        reach: the length, m, of which positions have the rounding; 1 rad of these.
     """
 
     group: Group
@@ -42,7 +43,7 @@ class Switch:
     kind: str
     is_one_of_several: bool
     part: int
-    length: float = 1.0
+    speed: float = 1.0
     reach: float = 1.0
 
     @property
@@ -88,7 +89,7 @@ class Switch:
         if self.kind == "switch":
             type_: Any = self.group.type_info.type
             if self.is_contact and self.part == 1:
-                return STILL * self.length
+                return STILL * self.speed
             touches = self.is_contact or (self.jumps and type_.unilateral and not self.words)
             return POSITION_ROUNDING * self.reach if touches else 0.0
         if self.effect == SEAM:
@@ -107,22 +108,27 @@ class Switch:
         return f"{name} [{self.part + 1}]" if is_numbered else name
 
 
+def turns(group: Group) -> bool:
+    """True of contacts whose gap or slip is an angle."""
+    type_: Any = group.type_info.type
+    return bool(type_.is_contact and type_.at is None)
+
+
 def switches_of(
-    loops: Iterable[tuple[str, Group]], length: float = 1.0, reach: float = 1.0
+    loops: Iterable[tuple[str, Group]], length: float = 1.0, time: float = 1.0, reach: float = 1.0
 ) -> tuple[Switch, ...]:
     """The switches of a model in the order in which ``watch`` gives them.
 
     Args:
         loops: (kind, group).
-        length, reach: of the scene, m.
+        length, time, reach: of the scene, m and s.
     """
 
-    def lengths_of(group: Group) -> tuple[float, float]:
-        type_: Any = group.type_info.type
-        return (1.0, 1.0) if type_.is_contact and type_.at is None else (length, reach)
+    def scales_of(group: Group) -> tuple[float, float]:
+        return (1.0 / time, 1.0) if turns(group) else (length / time, reach)
 
     return tuple(
-        Switch(group, k, kind, len(group.type_info.outputs[kind]) > 1, part, *lengths_of(group))
+        Switch(group, k, kind, len(group.type_info.outputs[kind]) > 1, part, *scales_of(group))
         for kind, group in loops
         if kind in ("switch", "bound", "knot")
         for k in range(group.count)

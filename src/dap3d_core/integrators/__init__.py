@@ -29,7 +29,7 @@ def explicit(
 
 
 def _adams(evaluator: Evaluator, y0: Any, times: Any, **options: Any) -> Integration:
-    from dap3d_core.integrators.adams.integration import AdamsIntegration
+    from dap3d_core.integrators.adams import AdamsIntegration
 
     functions, system, loops = evaluator.functions, evaluator.system, evaluator.loops
     options |= _placed_steps(evaluator)

@@ -16,7 +16,7 @@ from dap3d_core.interface.codegen.specialise import (
     uncalled,
 )
 from dap3d_core.interface.codegen.type_info import TypeInfo
-from dap3d_core.interface.examine.examine import prepared
+from dap3d_core.interface.examine.constants import prepared
 from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.interface.types import BodyPose, TypeBase, acts_on_all, turns_of
 from dap3d_core.kernels.array_types import Floats as Floats

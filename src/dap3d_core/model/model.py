@@ -4,7 +4,7 @@ Coordinates stand in the state u in the order of the manual: r, p of every body,
 of every body.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,14 @@ from dap3d_core.interface.types import BodyPose, pose
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers, PrepareError
 from dap3d_core.model.joint_angles import JointAngles, joint_angle_name
 from dap3d_core.model.rotations import read_only
-from dap3d_core.model.scales import ORDINARY, Scales, gyrations_of, scales_of
+from dap3d_core.model.scales import (
+    LATER,
+    LONGEST,
+    ORDINARY,
+    Scales,
+    gyrations_of,
+    scales_of,
+)
 from dap3d_core.model.state_layout import (
     COORDINATES,
     VELOCITIES,
@@ -25,6 +32,7 @@ from dap3d_core.model.state_layout import (
     integrated_layout,
     report_layout,
     row_layout,
+    split,
     state_layout,
 )
 from dap3d_core.scene import Instance, ValidatedScene
@@ -292,6 +300,36 @@ class Model(Bodies):
         """The length, m, of which positions have the rounding: ``length``, or the distance."""
         farthest = float(np.max(np.abs(self.r), initial=0.0))
         return farthest if farthest > ORDINARY[1] * self.length else self.length
+
+    def time(self, forces: Callable[[float], Floats]) -> float:
+        """The time, s, that tolerances speak of: a power of ten, 1 of ordinary scenes.
+
+        In that time the start would change by as much as the size of the parts: by its velocities,
+        and by what forces do to bodies without joints, which may hold all at first; where nothing
+        moves so, by forces that act later. Motions of a scene of ordinary size that are quicker
+        than ordinary need no other limits.
+
+        Args:
+            forces: gives (n, 6) force and moment on each body, placed as at the start, at t, s.
+        """
+        of_turning = np.linalg.norm(self.Jp, ord=2, axis=(-2, -1))[:, None]
+        _, _, v, w = split(self.u0)
+
+        def fastest(t: float) -> float:
+            wrench = forces(t)
+            moving = np.array([v, wrench[:, :3] / self.mass[:, None]]) / self.part_size
+            turning = np.array([w, wrench[:, 3:] / of_turning])
+            rates = np.linalg.norm([moving, turning], axis=-1).max(axis=(0, -1), initial=0.0)
+            return float(max(rates[0], np.sqrt(rates[1])))
+
+        rate = fastest(0.0)
+        if not rate > 1.0 / LONGEST:
+            later = LATER if self.functions else ()
+            rate = next((1.0 / t for t in later if fastest(t) * t >= 1.0), 1.0)
+        least = ORDINARY[0] if self.length != 1.0 else 0.0
+        if not 1.0 / LONGEST < rate < LONGEST or least <= 1.0 / rate <= ORDINARY[1]:
+            return 1.0
+        return float(10.0 ** -np.round(np.log10(rate)))
 
     def row_owner(self, row: int) -> str:
         """Name of the joint that a constraint row belongs to."""

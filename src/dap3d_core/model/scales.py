@@ -7,10 +7,14 @@ import numpy as np
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.model.rotations import to_global
 
-#: Sizes, m, of ordinary scenes: their tolerances are in metres as they are.
+#: Sizes, m, and times, s, of ordinary scenes: their tolerances are in metres and seconds.
 ORDINARY = 0.03, 30.0
 #: An extent beyond is none: a radius of gyration of masses that are no masses.
 WIDEST = 1e20
+#: Times beyond are no scale of a motion, s.
+LONGEST = 1e12
+#: Instants, s, at which forces may show that do not act at first.
+LATER = tuple(10.0**k for k in range(-9, 10))
 #: Points nearer than this part of their distance from the origin are one but for rounding.
 EXTENT = 1e-12
 

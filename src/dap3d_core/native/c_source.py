@@ -32,6 +32,9 @@ PARAMETERS = ("parameter", "fixed")
 #: Limits of contact_jumps.py that the runtime has as well: gaps that touch; what comes to no end.
 LIMITS = ("TOUCHING", "TOUCHING_AT_START", "MOST_CHANGES", "WITHIN", "MOST_JAMS", "RATTLING",
           "MOST_STEPS", "SLOW")  # fmt: skip
+#: Units of the quantities of states, but 1; of rates, that are not the unit over s.
+STATE_UNITS = {"r": "m", "v": "m/s", "w": "rad/s"}
+RATE_UNITS = {"1": "1/s", "m/s": "m/s^2", "rad/s": "rad/s^2"}
 
 
 @attrs.frozen
@@ -65,7 +68,7 @@ def variables_of(
     """The variables of a model in the order of their references."""
     evaluator, image = prepared.evaluator, prepared.image
     model, F = evaluator.model, evaluator.system.F
-    units = [*_state_units(prepared), "J"]
+    units = [*(STATE_UNITS.get(q, "1") for q in evaluator.coordinates.quantities), "J"]
     found = [Variable("time", "time", "s", "time", 0)]
     for name, row, value in zip(
         model.input_names, model.input_rows.tolist(), model.input_values.tolist(), strict=True
@@ -84,23 +87,15 @@ def variables_of(
     if means:
         return found
     found += [
-        Variable(f"der({n})", "derivative", rate_unit(unit), f"derivative of {n}", k)
+        Variable(
+            f"der({n})", "derivative", RATE_UNITS.get(unit, f"{unit}/s"), f"derivative of {n}", k
+        )
         for k, (n, unit, _) in states
     ]
     switches = range(prepared.run.present.work.switches.shape[1])
     return found + [
         Variable(f"switch.{k + 1}", "indicator", "1", f"switch {k + 1}", k) for k in switches
     ]
-
-
-def rate_unit(unit: str) -> str:
-    """The unit of a rate."""
-    return {"1": "1/s", "m/s": "m/s^2", "rad/s": "rad/s^2"}.get(unit, f"{unit}/s")
-
-
-def _state_units(prepared: PreparedRun) -> list[str]:
-    units = {"r": "m", "p": "1", "v": "m/s", "w": "rad/s", "z": "1"}
-    return [units.get(q, "1") for q in prepared.evaluator.coordinates.quantities]
 
 
 def symbols_of(unit: Unit | PairUnit) -> list[str]:

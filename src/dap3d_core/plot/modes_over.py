@@ -15,7 +15,7 @@ from dap3d_core.plot import style
 from dap3d_core.plot.sweep.panels import LINE_COLORS, norm_of
 
 if TYPE_CHECKING:
-    from dap3d_core.simulation.linearization.eigenvalues import Complex
+    from dap3d_core.simulation.linearization.state_matrices import Complex
     from dap3d_core.study.modes_over import ModesOver
 
 #: The colour of what grows, which no curve has.

@@ -97,6 +97,7 @@ def style_axes(
     ax.tick_params(labelsize=LETTERS)
     for offset in (ax.xaxis.get_offset_text(), ax.yaxis.get_offset_text()):
         offset.set_fontsize(LETTERS)
+    ax.yaxis.get_offset_text().set_horizontalalignment("right")  # beside a legend above the axes
     if grid:
         ax.grid(True, alpha=0.3, linewidth=0.6)
     ax.spines[["top", "right"]].set_visible(False)

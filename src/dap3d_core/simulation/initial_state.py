@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from dap3d_core.simulation.initial.start_state import StartState
 
 
-#: A start this far off the constraints, left uncorrected, gets a note.
+#: A start this far off the constraints, in units of the scene, left uncorrected, gets a note.
 OFF_CONSTRAINTS = 1e-6
 
 
@@ -82,7 +82,7 @@ def start_notes(start: InitialState, evaluator: Evaluator, scene: Scene) -> list
     if start.initial is not None:
         return notes + assemble.correction_notes(start.initial, evaluator, scene)
     position, velocity = assemble.violation(evaluator, start.u)
-    if max(position, velocity) <= OFF_CONSTRAINTS:
+    if max(position, velocity * evaluator.time) <= OFF_CONSTRAINTS * evaluator.model.length:
         return notes
     return [
         *notes,

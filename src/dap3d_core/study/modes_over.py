@@ -13,13 +13,13 @@ from dap3d_core.registry import load_registry
 from dap3d_core.registry.arguments import checked
 from dap3d_core.scene import Scene, check, load
 from dap3d_core.simulation import SimulationError
-from dap3d_core.simulation.linearization.eigenvalues import Complex
 from dap3d_core.simulation.linearization.linearization import (
     MANY_BODIES,
     REAL_PART_ROUNDING,
     Linearization,
     linearize,
 )
+from dap3d_core.simulation.linearization.state_matrices import Complex
 from dap3d_core.study.parameters import SceneParameter, read_values, with_values
 
 #: Weight of the distance of eigenvalues beside the likeness of shapes: it only breaks ties.

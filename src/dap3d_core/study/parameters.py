@@ -331,6 +331,8 @@ def _no_table(checked: ValidatedScene, name: str, table: str, rest: list[str]) -
     if homes:
         near = f"{homes[0]}.{name}"
         near += ".value" if homes[0] == "inputs" and not rest else ""
+    elif name in checked.scene.parameters:
+        near = f"parameters.{name}"
     elif not rest and table in attrs.fields_dict(Simulation):
         near = f"simulation.{name}"
     elif similar := nearest(table, TABLES):

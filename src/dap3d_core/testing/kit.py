@@ -12,7 +12,7 @@ from dap3d_core.interface.codegen.reactions import joints_read
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError, where_is
 from dap3d_core.interface.examine.examine import examine
-from dap3d_core.testing.checks import branches, elements, forces, joints, purity
+from dap3d_core.testing.checks import branches, elements, joints, purity
 from dap3d_core.testing.checks.findings import (
     FAILED,
     LEFT_OUT,
@@ -21,7 +21,7 @@ from dap3d_core.testing.checks.findings import (
     Report,
     TypeMotion,
 )
-from dap3d_core.testing.checks.motion import motion_of_type
+from dap3d_core.testing.checks.joints import motion_of_type
 from dap3d_core.testing.samples.sampled_type import SampledType, UndefinedError, sampled_types
 
 #: Default number of random poses on and off the manifold, and their seed.
@@ -150,13 +150,13 @@ def _checks(type_info: TypeInfo, poses: int, seed: int) -> list[Check]:
     for subject in sampled_types(type_info, seed, poses):
         by_joint = "its formulas are the friction of its joint, which is checked with that"
         if subject.type_info.friction_joint:
-            checks.append(Check("energy", subject, by_joint, forces.potential))
+            checks.append(Check("energy", subject, by_joint, elements.potential))
             continue
         checks += of_kind[subject.type.kind](subject)
         if "rate" in subject.type_info.kernels:
             ground = joints.against_ground(subject)
             checks.append(Check("rate", subject, "", elements.tangent))
-            checks.append(Check("rate frame", subject, ground, elements.frame))
+            checks.append(Check("rate frame", subject, ground, elements.rate_frame))
         checks.append(Check("branches", subject, "", branches.switches))
         checks.append(Check("rest", subject, "", branches.rest))
         checks.append(Check("purity", subject, "", purity.purity))
@@ -195,10 +195,10 @@ def _of_joint(subject: SampledType) -> list[Check]:
         checks.append(Check("resist", subject, "", elements.resist))
     checks += _of_jumps(subject)
     if "friction" in subject.type_info.kernels:
-        checks.append(Check("friction power", subject, "", _on_friction(forces.dissipation)))
-        for name, run in (("friction frame", forces.frame), ("friction balance", forces.balance)):
+        checks.append(Check("friction power", subject, "", _on_friction(elements.dissipation)))
+        for run in (elements.frame, elements.balance):
             on_friction = _on_friction(partial(run, kernel="friction"))
-            checks.append(Check(name, subject, ground, on_friction))
+            checks.append(Check(f"friction {run.__name__}", subject, ground, on_friction))
     return checks
 
 
@@ -216,12 +216,12 @@ def _of_force(subject: SampledType) -> list[Check]:
     if "wrench" not in subject.kernels.names():
         ground = "it has no wrench, and acts by its jumps alone"
     checks = [
-        Check("energy", subject, energy, forces.potential),
-        Check("frame", subject, ground, forces.frame),
-        Check("action and reaction", subject, ground, forces.balance),
+        Check("energy", subject, energy, elements.potential),
+        Check("frame", subject, ground, elements.frame),
+        Check("action and reaction", subject, ground, elements.balance),
     ]
     if joints_read(subject.type_info):
-        checks.append(Check("unloaded", subject, "", forces.unloaded))
+        checks.append(Check("unloaded", subject, "", elements.unloaded))
     return checks + _of_jumps(subject)
 
 
@@ -239,7 +239,8 @@ def _of_jumps(subject: SampledType) -> list[Check]:
         gives = "the check restitution sees energy created"
     energy = Check("impulse energy", subject, gives, jumps.energy)
     if not jumps.has_rows(subject):
-        frame, balance = (partial(run, kernel="impulse") for run in (forces.frame, forces.balance))
+        frame = partial(elements.frame, kernel="impulse")
+        balance = partial(elements.balance, kernel="impulse")
         return [
             energy,
             Check("jump frame", subject, ground, frame),

@@ -3,7 +3,13 @@
 import matplotlib.figure
 import pytest
 
-from dap3d_core.plot.style import PlainOffset, folded, show_rounding_flat
+from dap3d_core.plot.style import (
+    PlainOffset,
+    folded,
+    legend_above,
+    show_rounding_flat,
+    style_axes,
+)
 
 
 @pytest.mark.parametrize(
@@ -30,3 +36,17 @@ def test_long_names_are_folded_at_their_dots():
     assert max(map(len, words.split("\n"))) <= 16
     assert words.replace("\n", "").replace(" ", "") == "bodies.the_connecting_rod.Jp.x[kgm²]"
     assert folded("a" * 50, 20).replace("\n", "") == "a" * 50
+
+
+def test_a_power_of_ten_stands_beside_the_legend():
+    figure = matplotlib.figure.Figure(figsize=(5.0, 3.0), layout="constrained")
+    ax, names = figure.subplots(), [f"a long name of curve {k}" for k in range(4)]
+    for k, name in enumerate(names):
+        ax.plot([0.0, 1.0], [0.0, (k + 1) * 1e-17], label=name)
+    style_axes(ax, "t", "y")
+    legend_above(ax, names, 5.0)
+    figure.draw_without_rendering()
+    offset = ax.yaxis.get_offset_text()
+    assert offset.get_text()
+    assert not offset.get_window_extent().overlaps(ax.get_legend().get_window_extent())
+    assert offset.get_window_extent().x0 >= 0.0

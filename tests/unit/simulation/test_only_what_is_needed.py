@@ -95,7 +95,7 @@ LEFT_ALONE = {
     VIEWED: ("matplotlib", "trimesh", "netCDF4", "xarray", "rich", "click"),
     # nothing that draws samples, fits, speaks to a cluster or reads measured data
     GRID: ("distributed", "scipy.stats", "scipy.optimize", "matplotlib", "dap3d_core.study.fit",
-           "dap3d_core.study.workers.dask_cluster", "dap3d_core.study.workers.environment",
+           "dap3d_core.study.workers.dask_cluster",
            "dap3d_core.result.quantities.measured_data"),
     # no other analysis, nothing that these need, no starts from results
     COMMAND: (*(f"dap3d_core.simulation.{name}" for name in (

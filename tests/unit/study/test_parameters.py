@@ -133,6 +133,12 @@ def test_invalid_names(checked, name, words):
     assert words in str(refused.value)
 
 
+def test_a_parameter_is_meant_by_its_name_alone(scene):
+    scene.parameters["stiff"] = 4.0
+    with pytest.raises(dap.SceneError, match=r"did you mean 'parameters\.stiff'"):
+        parameters_named(check(scene, dap.load_registry()), ["stiff"])
+
+
 def test_all_mistakes_at_once_and_no_number_twice(checked):
     names = ["bodies.rod.r.x", "bodies.rod.r.1", "none", "bodies.rod.r.x", "bodies.rod.Jp.1.2"]
     with pytest.raises(dap.SceneError) as refused:

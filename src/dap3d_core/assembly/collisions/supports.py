@@ -5,8 +5,8 @@ A capsule is its axis here, a sphere its centre; their radii are added to distan
 
 import math
 
-from dap3d_core.assembly.collisions.boxes import dot_axis
 from dap3d_core.assembly.collisions.placed_shapes import PlacedShapes
+from dap3d_core.assembly.collisions.solids import dot_axis
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.scene.contacts.collision_shapes import (

@@ -26,12 +26,12 @@ from dap3d_core.assembly.motion.joint_motion import (
     Part,
     merged,
 )
-from dap3d_core.assembly.motion.joint_rows import JointRows
-from dap3d_core.assembly.motion.refusals import (
+from dap3d_core.assembly.motion.joint_rows import (
     DEPENDENT,
     NOT_CLOSED,
     NOT_CONSTANT,
     NOT_INVARIANT,
+    JointRows,
     refused_joints,
     two_bodies,
     two_slots,

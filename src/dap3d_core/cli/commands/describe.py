@@ -103,6 +103,7 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
     from dap3d_core.cli.commands.describe_example import example_of
     from dap3d_core.interface.errors import where_is
     from dap3d_core.interface.fields import specs_of
+    from dap3d_core.scene.validate.joint_fields import keys_beside_fields
 
     type_info = registry.get(kind, keyword)
     type_: Any = type_info.type
@@ -119,6 +120,7 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
         "bodies": list(type_info.layout.slots),
         "states": type_.state_lengths(),
         "synonyms": list(type_.synonyms),
+        "also": list(keys_beside_fields(type_)),
         **_class_data(type_info),
         "fields": [
             {
@@ -246,10 +248,13 @@ def _show(console: "Terminal", data: dict[str, Any], *, names: bool) -> None:
         states = (name if n == 1 else f"{name} ({n} numbers)" for name, n in data["states"].items())
         initial = "initial values by fields in _0, tolerances by fields in _atol"
         pairs.append(("states", f"{', '.join(states)}; {initial}"))
+    if data["also"]:
+        pairs.append(("also takes", f"{', '.join(data['also'])} (docs/reference/scene-file.md)"))
     console.facts(pairs)
     console.title("fields")
     if data["fields"]:
-        rows = [(f["name"], f["kind"], default_text(f), f["unit"] or "-", meaning_text(f))
+        rows = [(f["name"], f["kind"], default_text(f), f["unit"] or "-",
+                 "; ".join(filter(None, (f["doc"], f["allowed"]))))
                 for f in data["fields"]]  # fmt: skip
         console.table(("field", "kind", "default", "unit", "meaning"), rows, fixed=(0, 1, 3))
     else:
@@ -259,7 +264,8 @@ def _show(console: "Terminal", data: dict[str, Any], *, names: bool) -> None:
         console.table(*variants_table(data), fixed=(0,))
     if names:
         console.title(f"names for its kernels ({', '.join(data['kernels'])})")
-        rows_ = [(n["name"], shape_text(n["shape"]), n["level"], n["doc"]) for n in data["names"]]
+        rows_ = [(n["name"], " x ".join(map(str, n["shape"])) or "number", n["level"], n["doc"])
+                 for n in data["names"]]  # fmt: skip
         console.table(("name", "shape", "level", "meaning"), rows_, fixed=(0, 1, 2))
     console.title("example")
     console.say(data["example"].rstrip(), indent=2)
@@ -330,16 +336,6 @@ def default_text(field: Mapping[str, Any]) -> str:
     if isinstance(default, float):
         return f"{default:g}"
     return "-" if default is None else _word(default)
-
-
-def meaning_text(field: Mapping[str, Any]) -> str:
-    """The meaning of a field and its allowed values."""
-    return "; ".join(w for w in (field["doc"], field["allowed"]) if w)
-
-
-def shape_text(shape: list[int]) -> str:
-    """The shape of an array."""
-    return " x ".join(map(str, shape)) if shape else "number"
 
 
 def _word(value: Any) -> str:

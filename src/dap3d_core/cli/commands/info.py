@@ -37,7 +37,7 @@ def _show_sweep(file: str) -> None:
 
 def _show_run(file: str) -> None:
     from dap3d_core.cli.console.console import count, print_json, scene_name, size, stdout
-    from dap3d_core.cli.console.run_summary import run_data, run_pairs, show_details
+    from dap3d_core.cli.console.run_summary import MOST_OF_FILE, run_data, run_pairs, show_details
     from dap3d_core.cli.framework.paths import open_result
     from dap3d_core.registry.suggestions import some
 
@@ -75,7 +75,7 @@ def _show_run(file: str) -> None:
             ("made with", ", ".join(f"{name} {v}" for name, v in result.versions.items())),
         ]
     )
-    show_details(console, data)
+    show_details(console, data, MOST_OF_FILE)
 
 
 def _short(value: object) -> str:

@@ -12,8 +12,8 @@ from dap3d_core.cli.process.exit_codes import DONE, Refused, refusing
 if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
     from dap3d_core.kernels.array_types import Floats
-    from dap3d_core.simulation.linearization.eigenvalues import Complex
     from dap3d_core.simulation.linearization.linearization import Linearization
+    from dap3d_core.simulation.linearization.state_matrices import Complex
 
 #: Frequencies by default, evenly spaced by their logarithms; more stand about each mode.
 COUNT = 200
@@ -99,7 +99,7 @@ def _frequencies(
     Raises:
         Refused: the last one is not above the first.
     """
-    from dap3d_core.simulation.linearization.frequency_response import samples, usual_range
+    from dap3d_core.simulation.linearization.state_matrices import samples, usual_range
 
     low, high = usual_range(lin.frequencies)
     low, high = low if first is None else first, high if last is None else last
@@ -114,7 +114,7 @@ def _data(
     """The responses as data."""
     import numpy as np
 
-    from dap3d_core.simulation.linearization.frequency_response import peaks
+    from dap3d_core.simulation.linearization.state_matrices import peaks
 
     return {
         "scene": name,

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from dap3d_core.result import Result
     from dap3d_core.simulation import CompiledModel
 
-#: Events that are printed.
-MOST_EVENTS = 6
+#: Events that are printed after a run, and of a file.
+MOST_EVENTS, MOST_OF_FILE = 6, 200
 #: Bodies whose corrected initial conditions are printed, those that were changed most.
 MOST_BODIES = 5
 #: Forces of actuators that the next command plots.
@@ -206,6 +206,7 @@ def _show_run(
     console.say(f"{target} written ({size(target.stat().st_size)}). Next:", whole=True)
     file = shell_word(target)
     quantities = [f"{name}.actuation" for name in outcome.result.record.actuation]
+    quantities = quantities or list(outcome.compiled.scene.outputs)
     quantities = quantities or [f"{outcome.result.summary.body_names[0]}.r"]
     words = " ".join(map(shlex.quote, quantities[:MOST_PLOTTED]))
     commands = (f"plot {file} {words}", f"view {file} --open", f"animate {file}", f"info {file}")
@@ -308,12 +309,13 @@ def _error_text(error: dict[str, Any] | None) -> str:
     return text if tenfold is None else f"{text}; until then tenfold every {tenfold:.3g} s"
 
 
-def show_details(console: Terminal, data: dict[str, Any]) -> None:
-    """Print events, ledger and notes of a run, but for the choice of its method."""
+def show_details(console: Terminal, data: dict[str, Any], most: int = MOST_EVENTS) -> None:
+    """Print events, ``most`` of them, ledger and notes, but for the choice of the method."""
     events = [event["text"] for event in data["events"]]
-    console.section("events", events[:MOST_EVENTS])
-    if len(events) > MOST_EVENTS:
-        console.say(f"and {len(events) - MOST_EVENTS} more", indent=2)
+    console.section("events", events[:most])
+    if len(events) > most:
+        where = "dap3d info" if most == MOST_EVENTS else "--json"
+        console.say(f"and {len(events) - most} more, which {where} lists", indent=2)
     if data["ledger"]:
         _show_ledger(console, data)
     console.section("notes", _split_notes(data)[1])

@@ -68,7 +68,6 @@ class SceneBuilder:
         names: names in the scene.
         inertia: the inertias that joints see.
         limits: what becomes of limits of joints: "off", "soft" or "hard".
-        stepped: shapes meet each other, by time stepping.
     """
 
     scene: Scene
@@ -77,7 +76,6 @@ class SceneBuilder:
     member: dict[str, tuple[str, Frame]]
     inertia: JointInertia
     limits: str
-    stepped: bool = False
     names: Names = attrs.Factory(Names)
     bodies: dict[str, str] = attrs.Factory(dict)
     surfaces: dict[Contact, str] = attrs.Factory(dict)

@@ -127,7 +127,7 @@ def scene_of(
         text = "method joint, for links without mass or inertia: others lose digits to them"
         remarks.translate(model.place, text)
     builder = SceneBuilder(scene, remarks, groups, member, _inertia(tree, groups), options.limits,
-                           options.contacts, names or Names())  # fmt: skip
+                           names or Names())  # fmt: skip
     builder.bodies[WORLD] = GROUND
     for group in groups.values():
         if group.name != WORLD:

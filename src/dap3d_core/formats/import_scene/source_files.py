@@ -1,6 +1,7 @@
 """Reads the files of a model: none outside of its folder and of packages that the user names."""
 
 import os
+import shlex
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from io import BytesIO
@@ -19,8 +20,14 @@ from dap3d_core.scene.files.read_mesh import read_mesh
 LARGEST = 64 * 2**20
 #: Meshes of more triangles, and images of more pixels, are refused.
 MOST_TRIANGLES, MOST_PIXELS = 3_000_000, 1_000_000
+#: Folders below the root that are looked through for packages.
+MOST_FOLDERS = 50_000
 #: Number of included files beyond which a model is refused, and their depth.
 MOST_INCLUDES, DEEPEST_INCLUDE = 500, 30
+
+
+class _UnknownPlaceError(FormatError):
+    """A file is in a package that is not known, or would have to be fetched."""
 
 
 @attrs.define(eq=False)
@@ -55,6 +62,7 @@ class SourceFiles:
     _open: list[Path] = attrs.Factory(list)
     _count: int = 0
     _meshes: dict[Path, tuple[Floats, Integers]] = attrs.Factory(dict)
+    _below: dict[str, list[Path]] | None = None
 
     def read_text(self) -> str:
         """The text of the file itself.
@@ -94,6 +102,13 @@ class SourceFiles:
             raise FormatError(f"includes more than {MOST_INCLUDES} files, or too deep", place)
         return parse_xml(self._read(path, place), self._name(path))
 
+    def has(self, name: str, base: Path | None = None) -> bool:
+        """True if a file that it names is there, and may be read."""
+        try:
+            return os.path.isfile(self._inside(name, NOWHERE, base or self.path.parent))
+        except FormatError:
+            return False
+
     @contextmanager
     def including(self, name: str, base: Path | None = None) -> Iterator[None]:
         """While what an included file holds is read: it must not include itself."""
@@ -111,19 +126,23 @@ class SourceFiles:
         With ``required`` it must be there.
 
         Raises:
-            FormatError: it lies outside of the folder of the model, or would have to be fetched.
+            FormatError: it lies outside of the folder of the model, or is required and not found.
         """
         if not self.shapes and not required:
             return None
-        path = self._inside(uri, place, base or self.path.parent, missing=True)
-        if not os.path.isfile(path) and required:
-            raise FormatError(f"there is no file {uri}, whose mass properties count", place)
-        if not os.path.isfile(path):
-            text = f"there is no file {uri}: its shape is not drawn"
-            text += ", and meets no others" if self.contacts else ""
-            self.remarks.leave_out(place, text, motion=self.contacts)
-            return None
-        return path
+        text, remedy = f"there is no file {uri}", ""
+        try:
+            path = self._inside(uri, place, base or self.path.parent, missing=True)
+            if os.path.isfile(path):
+                return path
+        except _UnknownPlaceError as error:
+            text, remedy = error.what, error.remedy
+        if required:
+            raise FormatError(f"{text}; its mass properties count", place, remedy)
+        text += ": its shape is not drawn" + (", and meets no others" if self.contacts else "")
+        text += f"; {remedy}" if remedy else ""
+        self.remarks.leave_out(place, text, motion=self.contacts)
+        return None
 
     def mesh(self, path: Path, place: Place) -> tuple[Floats, Integers]:
         """Vertices (k, 3) and triangles (m, 3) of a mesh file.
@@ -168,7 +187,8 @@ class SourceFiles:
         elif separator and scheme == "file":
             name = rest
         elif separator:
-            raise FormatError(f"{uri!r} is no file of the model; nothing is fetched", place)
+            what = f"{uri!r} is no file of the model; nothing is fetched"
+            raise _UnknownPlaceError(what, place)
         if "\0" in name or not name.isprintable():
             raise FormatError("the name of a file holds control characters", place)
         try:
@@ -184,19 +204,42 @@ class SourceFiles:
         raise FormatError(f"{uri!r} lies outside of the folder of the model", place, remedy)
 
     def _package(self, package: str, uri: str, place: Place) -> Path:
-        """The folder of a package: given, or of its name above the file or beside such a folder."""
+        """The folder of a package: given, or the nearest one of its name within the root.
+
+        It is above the file, beside such a folder, or the only one of its name anywhere below.
+        """
         if package in self.packages:
             return self.packages[package]
         root = self.folder.resolve()
-        for folder in self.path.resolve().parents:
-            if package and folder.is_relative_to(root):
-                if folder.name == package:
-                    return folder
-                if os.path.isdir(folder / package):
-                    return folder / package
-        remedy = f"name its folder with --package {package}=FOLDER, or that which holds it with "
-        remedy += "--root, or leave shapes out with --no-shapes"
-        raise FormatError(f"{uri}: the package {package} is not known", place, remedy)
+        above = [one for one in self.path.resolve().parents if one.is_relative_to(root)]
+        for folder in (one for place in above for one in (place, place / package)):
+            known = package and folder.name == package and os.path.isdir(folder)
+            if known and folder.resolve().is_relative_to(root):
+                return folder
+        found = self._folders().get(package, [])
+        if len(found) == 1:
+            return found[0]
+        what = f"{uri}: the package {package} is not known"
+        option = f"--package {shlex.quote(f'{package}=FOLDER')}"
+        remedy = f"name its folder with {option}, or one that holds it with --root"
+        if found:
+            what = f"{uri}: there are {len(found)} folders {package} within the root"
+            remedy = f"name one with {option}"
+        raise _UnknownPlaceError(what, place, remedy)
+
+    def _folders(self) -> dict[str, list[Path]]:
+        """The folders below the root by their names, but for hidden ones and links."""
+        if self._below is None:
+            self._below, count = {}, 0
+            for folder, names, _ in os.walk(self.folder):
+                names[:] = sorted(name for name in names if not name.startswith("."))
+                for path in (Path(folder, name) for name in names):
+                    if not path.is_symlink():
+                        self._below.setdefault(path.name, []).append(path)
+                count += len(names)
+                if count > MOST_FOLDERS:
+                    break
+        return self._below
 
     def _read(self, path: Path, place: Place) -> bytes:
         try:

@@ -8,7 +8,16 @@ As None it is known when the code is compiled, so that ``standard`` has no line 
 from collections.abc import Callable
 from typing import Any
 
-from dap3d_core.assembly.arrays import ACCELERATION, EVEN, LENGTH, POSITION, Floats, System
+from dap3d_core.assembly.arrays import (
+    ACCELERATION,
+    EVEN,
+    FIRST_STATE,
+    LENGTH,
+    POSITION,
+    SHARE,
+    Floats,
+    System,
+)
 from dap3d_core.assembly.evaluate import (  # noqa: F401  read by projection.py
     call_kinds,
     evaluate_forces,
@@ -89,6 +98,18 @@ def factorise_regularised(system: System) -> int:
     assemble(system.targets, system.contributions, system.D, system.K)
     regularise(system.nodes, system.compliance, system.K)
     return factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
+
+
+@compiled_into
+def slide_sharing(system: System) -> bool:
+    """True if contacts that share what they carry slide: the motion depends on the share."""
+    contacts, states, found = system.contacts, system.states, False
+    for c in range(contacts.shape[0]):
+        first = contacts[c, FIRST_STATE]
+        slides = (states[first] > 0.5) & (states[first] < 1.5)
+        for k in range(first + SHARE, first + SHARE + 3):
+            found |= slides & (states[k] != 0.0)
+    return found
 
 
 @compiled_into

@@ -73,6 +73,7 @@ class ContactArrays(Arrays):
     ratio_s: Floats
     e: Floats
     length: Floats  # (m,) of the scene, m
+    speed: Floats  # that in the time of the scene, m/s
     rounding: Floats  # of gaps, m
     arm: Floats  # of what turns that length, which makes it slip; else 1
     gapless: Floats  # 1 where the first row is one of slip, and not along a normal
@@ -122,7 +123,7 @@ class ContactArrays(Arrays):
     leaves: Integers  # 1 of those whose normal force has just vanished
     # what is found
     mode: Floats  # (m,) 0 open, 1 slides, 2 sticks
-    way: Matrix  # (m, 3) directions of sliding, as long as ``length``, zero where none is known; of
+    way: Matrix  # (m, 3) directions of sliding, as long as ``speed``, zero where none is known; of
     near: Matrix  # what sticks that length for rows that do not hold, as others hold that;
     force: Matrix  # forces on body i of those that share, global axes; forces in their frames
     jams: Integers  # 1 of contacts that jam

@@ -40,8 +40,9 @@ class ContactTable:
         ratio, ratio_s: (m,) the same along the second tangent, as parts of them: 1 but in ellipses.
         newton: (m,) True where the law of impact is Newton's.
         turns: (m,) 1 of those whose gap or slip is an angle, 0 of others.
-        length: (m,) what limits of gaps and speeds are multiplied by: the length of the scene, m;
-            1 rad of those that turn.
+        length: (m,) what limits of gaps are multiplied by: the length of the scene, m; 1 rad of
+            those that turn.
+        speed: (m,) the same of speeds: that length in the time of the scene.
         rounding: (m,) m, of gaps.
         arm: (m,) m, of those that turn: on it their angles are gaps and slip, as of the others; 1.
         movable: (m,) True of those that a scene may have moved until they touch.
@@ -102,7 +103,7 @@ class ContactTable:
             values=np.zeros(max(sizes, default=0)), place=np.zeros(1),
         )  # fmt: skip
         self.length = np.where(self.turns > 0.0, 1.0, model.length)
-        self.arm = model.length / self.length
+        self.arm, self.speed = model.length / self.length, self.length / evaluator.time
         reach = np.where(self.turns > 0.0, model.length, model.reach)
         self.rounding = POSITION_ROUNDING * reach
         self.gapless = (self.alone & self.holds[:, 0]).astype(float)
@@ -129,6 +130,7 @@ class ContactTable:
             "mu": self.mu / self.arm,
             "mu_s": self.mu_s / self.arm,
             "length": self.length * self.arm,
+            "speed": self.speed * self.arm,
             "newton": self.newton.astype(np.int64),
             "alone": self.alone.astype(np.int64),
             "under": self.under,

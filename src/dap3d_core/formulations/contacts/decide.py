@@ -165,12 +165,12 @@ def repeat(
     are_same = not slide_sharing(s) or share_anew(t, s, system, loops, functions, tensions)
     for c in range(s.mode.shape[0]):
         size = size_across(s, c, s.slip[c])
-        if s.mode[c] == 1.0 and size > STOPPED * s.length[c]:
+        if s.mode[c] == 1.0 and size > STOPPED * s.speed[c]:
             first = 0 if s.gapless[c] > 0.0 else 1
             for k in range(3):
                 s.way[c, k] = 0.0
                 for i in range(first, 3):
-                    part = s.length[c] / s.arm[c] * s.slip[c, i] / size
+                    part = s.speed[c] / s.arm[c] * s.slip[c, i] / size
                     s.way[c, k] += part * s.frames[c, i, k]
     put_state(s, system)
     return are_same
@@ -270,7 +270,7 @@ def take_ended(s: ContactArrays) -> None:
         s.leaves[c] = s.ended[c, 0] != 0 and s.was[c] > 0.5
         if s.ended[c, 1] == 0:
             continue
-        if s.was[c] > 1.5 and size_across(s, c, s.slip[c]) < 0.5 * STRAYED * s.length[c]:
+        if s.was[c] > 1.5 and size_across(s, c, s.slip[c]) < 0.5 * STRAYED * s.speed[c]:
             friction = s.says.found[c][FRICTION:]
             for i in range(3):
                 force[i] = 0.0
@@ -279,7 +279,7 @@ def take_ended(s: ContactArrays) -> None:
             if size_across(s, c, force) > 0.0:
                 put_slip_against(s, c, force, s.begin_way[c])
                 s.begins[c] = 1
-        elif s.was[c] < 1.5 and size_across(s, c, s.slip[c]) < STOPPED * s.length[c]:
+        elif s.was[c] < 1.5 and size_across(s, c, s.slip[c]) < STOPPED * s.speed[c]:
             s.stops[c] = 1
 
 
@@ -327,7 +327,7 @@ def stop_what_rests(s: ContactArrays, system: System) -> None:
         if not is_pressed(s, c, s.in_touch, s.in_touch_count):
             continue
         slips = size_across(s, c, s.slip[c]) > still_speed(s, c)
-        for i in range(3 if abs(s.closing[c]) <= AT_REST * s.length[c] else 0):
+        for i in range(3 if abs(s.closing[c]) <= AT_REST * s.speed[c] else 0):
             if not slips or (i == 0 and s.gapless[c] == 0.0):
                 s.rows[count], s.right[count] = 3 * c + i, -s.slip[c, i]
                 count += 1
@@ -368,7 +368,7 @@ def leave_movable(t: float, s: ContactArrays, system: System, loops: Any, functi
     count = 0
     for k in range(s.in_touch_count):
         c = s.in_touch[k]
-        least = -AT_REST * s.length[c]
+        least = -AT_REST * s.speed[c]
         if s.alone[c] != 0 or s.W[3 * c, 3 * c] > HELD * free_mobility(s, 3 * c):
             s.in_touch[count] = c
             count += 1
@@ -447,7 +447,7 @@ def settle(s: ContactArrays, system: System) -> None:
         is_near = -DEEPER * s.limit[c] < gap < s.limit[c]
         s.values[c] = s.arm[c] * gap if is_near else 0.0
         s.least[c] = -2.0 * rounding
-        is_slow = s.closing[c] < AT_REST * s.length[c] or s.opening[c] != 0
+        is_slow = s.closing[c] < AT_REST * s.speed[c] or s.opening[c] != 0
         if s.role[c] == 2 and is_slow and s.values[c] < -0.5 * rounding:
             s.role[c] = 1
     lift(s)

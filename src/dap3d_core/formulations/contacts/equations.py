@@ -23,8 +23,10 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import (
+    FIRST_STATE,
     KNOT,
     SCRATCH,
+    SHARE,
     SWITCH,
     TOLERANCE_C,
     TOLERANCE_V,
@@ -46,10 +48,12 @@ from dap3d_core.assembly.state_update import size_of_positions, size_of_velociti
 from dap3d_core.formulations.common import constraints
 from dap3d_core.formulations.common.constraints import (
     factorise,
+    factorise_regularised,
     linearise,
     power_of_drivers,
     report_levels,
     report_multipliers,
+    slide_sharing,
     solve_rows,
 )
 from dap3d_core.formulations.common.projection import project_onto
@@ -57,6 +61,7 @@ from dap3d_core.formulations.contacts.watched_rates import store_watched, take_w
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.scalar_math import is_differentiated, where, with_slopes
+from dap3d_core.linear.ldlt.factor import LEAST_ALIKE, weigh_alike
 from dap3d_core.linear.least_squares import invert
 
 #: Compliance of a row as part of its squared length; how much less where passes do not converge,
@@ -74,14 +79,14 @@ REACHED = 1e3
 #: Columns of ``System.contacts``: of each point its loop and where its integers and numbers begin,
 #: its first row, bodies, first state; 1 of friction that is the same under any load; of friction of
 #: a joint the first row of its load, their number, 1 where that pushes alone; what presses it.
-LOOP, INTEGERS, NUMBERS, ROW, BODY_I, BODY_J, STATE = range(7)
+LOOP, INTEGERS, NUMBERS, ROW, BODY_I, BODY_J, STATE = *range(6), FIRST_STATE
 LOADED, LOAD, LOADS, PUSHES, UNDER, COLUMNS = range(7, 13)
 #: Passes of Newton's method for loads, and the part that the last one changes.
 LOAD_PASSES, LOAD_SETTLED = 50, 1e-14
 #: Places in a column, from its end: of its contact, of the normal force, of its power.
 PLACE, FORCE, POWER = 1, 2, 3
 #: Of a contact's states behind its mode: the direction of sliding, what it is given; how many.
-WAY, NEAR, OF_CONTACT = 1, 4, 7
+WAY, NEAR, OF_CONTACT = 1, SHARE, 7
 #: Modes (interface/contacts/rows.py) are above these.
 _OPEN, _SLIDING = 0.5, 1.5
 
@@ -111,20 +116,30 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     copy(applied, system.acceleration)
     given = largest_given(system)
     part = PART if given > 0.0 else PART_OF_INDEPENDENT
-    factorise(system, part)
+    factorise_contacts(system, part)
     if given == 0.0 and not are_independent(system):
         part = PART
-        factorise(system, part)
+        factorise_contacts(system, part)
     count = add_columns(t, system, loops)
     while not has_settled(system, count, given, part) and part > LEAST:
         part = PART if part == PART_OF_INDEPENDENT else part * SMALLER
-        factorise(system, part)
+        factorise_contacts(system, part)
         count = add_columns(t, system, loops)
         copy(system.acceleration, applied)
     for c in range(count):
         own = column(system, c)
         power += own[own.shape[0] - POWER] * own[own.shape[0] - FORCE]
     return power + power_of_drivers(system)
+
+
+@compiled_into
+def factorise_contacts(system: System, part: float) -> None:
+    """Factors; what slides and shares does so as on feet of one stiffness."""
+    if slide_sharing(system):
+        weigh_alike(system.blocks, system.D, part, LEAST_ALIKE, system.compliance)
+        factorise_regularised(system)
+    else:
+        factorise(system, part)
 
 
 @compiled_into

@@ -28,7 +28,7 @@ BOUNDLESS = 1e100
 @compiled
 def still_speed(s: ContactArrays, c: int) -> float:
     """Speed, m/s, below which a contact is at rest."""
-    return STILL * s.length[c]
+    return STILL * s.speed[c]
 
 
 @compiled
@@ -123,7 +123,10 @@ def add_sliding(s: ContactArrays) -> bool:
 
 @compiled
 def put_open(s: ContactArrays) -> None:
-    """Rates of closed contacts without their forces, with friction that is given: ``cone.b``."""
+    """Rates of closed contacts without their forces, with friction that is given: ``cone.b``.
+
+    Of friction in joints those are zero that are rounding beside what it could do.
+    """
     n, cone = 3 * s.closed_count, s.cone
     for k in range(n):
         cone.b[k] = s.free[3 * s.closed[k // 3] + k % 3]
@@ -137,6 +140,13 @@ def put_open(s: ContactArrays) -> None:
                 cone.b[i] -= s.load[c] * s.mu[c] * along
             elif s.alone[c] != 0:  # in its first column is what a load of one does
                 cone.b[i] += s.load[c] * row[0]
+    for k in range(s.closed_count):
+        c = s.closed[k]
+        # dependent rows, as of gears, could not hold it
+        if s.alone[c] != 0 and s.load_count[c] == 0 and s.slides[c] == 0:
+            least = CANCELLED * s.mu_s[c] * s.load[c]
+            for i in range(3 * k, 3 * k + 3):
+                cone.b[i] = cone.b[i] if abs(cone.b[i]) > least * cone.A[i, i] else 0.0
 
 
 @compiled
@@ -150,6 +160,16 @@ def put_rates(s: ContactArrays) -> None:
     for k in range(s.closed_count):
         if s.slides[s.closed[k]] != 0:
             put_sliding_force(s, k)
+
+
+@compiled
+def some_slide(s: ContactArrays) -> bool:
+    """True if a closed contact slides against friction."""
+    found = False
+    for k in range(s.closed_count):
+        c = s.closed[k]
+        found |= s.slides[c] != 0 and s.alone[c] == 0 and s.mu[c] > 0.0
+    return found
 
 
 @compiled

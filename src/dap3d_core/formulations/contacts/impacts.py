@@ -153,7 +153,7 @@ def take_part(s: ContactArrays, is_last: bool) -> bool:
         c = s.in_touch[k]
         bounces |= s.e[c] > 0.0
         presses = s.under[c] if s.under[c] >= 0 else c
-        if s.closing[presses] < -AT_REST * s.length[presses]:
+        if s.closing[presses] < -AT_REST * s.speed[presses]:
             s.touching[s.touching_count] = c
             s.touching_count += 1
     if s.touching_count > 0 and (is_last or not bounces):
@@ -211,7 +211,7 @@ def unjam(s: ContactArrays, system: System) -> bool:
     s.touching_count = 0
     for k in range(s.in_touch_count):
         c = s.in_touch[k]
-        if s.closing[c] < AT_REST * s.length[c]:
+        if s.closing[c] < AT_REST * s.speed[c]:
             s.touching[s.touching_count] = c
             s.touching_count += 1
     if not stop_slip(s):
@@ -241,7 +241,7 @@ def find_low(s: ContactArrays) -> bool:
     for k in range(s.in_touch_count):
         c = s.in_touch[k]
         v = s.closing[c]
-        if not (s.role[c] == 2 and s.mode[c] == 0.0 and v > AT_REST * s.length[c]):
+        if not (s.role[c] == 2 and s.mode[c] == 0.0 and v > AT_REST * s.speed[c]):
             continue
         a = -s.free[3 * c]
         for q in range(n):
@@ -281,7 +281,7 @@ def repeat_impulses(s: ContactArrays, first: int) -> None:
     for k in range(s.touching_count):
         c = s.touching[k]
         old = s.slips[first + c]
-        if s.gapless[c] == 0.0 and old[0] < -AT_REST * s.length[c]:
+        if s.gapless[c] == 0.0 and old[0] < -AT_REST * s.speed[c]:
             slowest = min(slowest, -old[0])
         for i in range(3):
             far = max(far, abs(s.slip[c, i] - old[i]))

@@ -405,7 +405,7 @@ def put_one(s: ContactArrays, k: int, shares: bool, is_one: bool, least: float) 
         s.force[c, i] = force[i]
         s.way[c, i] = s.near[c, i] = 0.0
         for q in range(3):
-            s.way[c, i] += s.length[c] / s.arm[c] * way[q] * s.frames[c, q, i]
+            s.way[c, i] += s.speed[c] / s.arm[c] * way[q] * s.frames[c, q, i]
             if near and (sticks or (q == 0 and normal)):
                 s.near[c, i] += s.arm[c] * force[q] * s.frames[c, q, i]
 

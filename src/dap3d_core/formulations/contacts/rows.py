@@ -237,6 +237,9 @@ def put_free(t: float, s: ContactArrays, system: System, loops: Any, functions: 
         s.free[i] = rate - bent
         if i % 3 == 0:
             terms = size_along_bodies(i // 3, s.J[own + i], out, system) + abs(bent)
+            for r in range(own):  # a body that joints hold has forces that cancel
+                by_row = along_bodies(i // 3, s.scaled[own + i], s.scaled[r], system)
+                terms += abs(by_row * s.lam_free[r])
             if abs(s.free[i]) <= RATE_ROUNDING * terms:
                 s.free[i] = 0.0  # what falls together does not press
     s.is_free = 1

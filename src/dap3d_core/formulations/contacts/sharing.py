@@ -25,6 +25,7 @@ from dap3d_core.formulations.contacts.forces import (
     put_open,
     put_rates,
     put_sizes,
+    some_slide,
 )
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.least_squares import factor_least, put_null, solve_least
@@ -38,6 +39,8 @@ HELD, OF_REST, RATE_ROUNDING = 1e-9, 0.05, 1e-13
 FORCE_ROUNDING = 1e-12
 #: Part of the largest force that cones leave, at least, where contacts hold inside them.
 LEAST_RIM = 1e-11
+#: Part of the largest force within cones by which forces as of feet are taken where some slide.
+WELL = 1e-3
 #: Of Newton's method passes at most, the decrements at which it is near and at which it has ended
 #: by its next pass, and how much more t weighs each time that it is near.
 PASSES, NEAR, CENTRED, HEAVIER = 50, 0.25, 1e-6, 10.0
@@ -187,6 +190,8 @@ def come_inside(s: ContactArrays, free: int) -> bool:
         free: how many of these there are.
     """
     size = largest(s.cone.x[: 3 * s.closed_count])
+    if some_slide(s) and share_alike(s, free) and farthest_outside(s) < -WELL * size:
+        return True
     terms = 5.0 * s.closed_count  # twice as many logarithms as cones, and forces
     t = farthest_outside(s)
     if not size > 0.0 or not t < np.inf:
@@ -207,6 +212,37 @@ def come_inside(s: ContactArrays, free: int) -> bool:
             break
         before = decrement
     return farthest_outside(s) < 0.0
+
+
+@compiled
+def share_alike(s: ContactArrays, free: int) -> bool:
+    """Let forces ``cone.x`` that hold be those of feet of one stiffness, as in equations.py.
+
+    They have nothing along vectors that no motion of bodies gives; False if these are fewer.
+    """
+    n, x, K, M = put_own_rows(s), s.cone.x, s.cone.K, s.cone.S
+    for i in range(n):
+        row = s.W[3 * s.closed[s.rows[i] // 3] + s.rows[i] % 3]
+        for k in range(n):
+            s.B[i, k] = row[3 * s.closed[s.rows[k] // 3] + s.rows[k] % 3]
+    rank = factor_least(s.B, n, n, DEPENDENT, 0.0, s.w, s.order)
+    if n - rank != free:
+        return False
+    for q in range(free):
+        put_null(s.B, n, rank, s.w, s.order, q, s.x)
+        s.right[q] = 0.0
+        for j in range(free):
+            M[q, j] = 0.0
+        for i in range(n):
+            s.right[q] -= s.x[i] * x[s.rows[i]]
+            for j in range(free):
+                M[q, j] += s.x[i] * K[s.rows[i], j]
+    rank = factor_least(M, free, free, DEPENDENT, 0.0, s.w, s.order)
+    solve_least(M, free, free, rank, s.w, s.order, s.right, s.cone.step)
+    for k in range(3 * s.closed_count):
+        for j in range(free):
+            x[k] += K[k, j] * s.cone.step[j]
+    return rank == free
 
 
 @compiled
@@ -387,7 +423,7 @@ def hold_freest(s: ContactArrays, count: int, alone: int, first: int, end: int) 
     for k in range(s.closed_count):
         c = s.closed[k]
         for i in range(first, end if is_left(s, c, alone) else 0):
-            s.way[c, i] = s.holds[c, i] * s.length[c]
+            s.way[c, i] = s.holds[c, i] * s.speed[c]
             left += s.holds[c, i]
     best = 0
     while left > 0 and best >= 0:

@@ -8,11 +8,17 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.metric import in_body_axes, scaled_moment
+from dap3d_core.formulations.common.constraints import slide_sharing
 from dap3d_core.formulations.joint_loops import layout
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.scalar_math import where
-from dap3d_core.linear.ldlt.factor import SINGULAR_NODE_RATIO, SINGULAR_PIVOT_RATIO
+from dap3d_core.linear.ldlt.factor import (
+    LEAST_ALIKE,
+    SINGULAR_NODE_RATIO,
+    SINGULAR_PIVOT_RATIO,
+    alike,
+)
 
 #: Solutions at most where rows may depend on each other. One leaves some ``PART`` of what lacked
 #: before, less of weak rows; they go on while the square of the change falls by this factor, until
@@ -40,7 +46,7 @@ def weigh_kept_rows(system: System, part: float) -> None:
         kept.compliance[j] = 0.0
     if part == 0.0:
         return
-    contacts = system.contacts.shape[0] > 0
+    contacts, shares = system.contacts.shape[0] > 0, slide_sharing(system)
     cuts, ends, D = pointer(kept.cuts), pointer(kept.ends), pointer(kept.D)
     for q in range(kept.cuts.shape[0]):
         c = layout.CUT_WIDTH * q
@@ -52,7 +58,8 @@ def weigh_kept_rows(system: System, part: float) -> None:
                 x, y, z = in_body_axes(s, D[d + 3], D[d + 4], D[d + 5])
                 x, y, z = scaled_moment(k, x, y, z)
                 own = (D[d] * D[d] + D[d + 1] * D[d + 1] + D[d + 2] * D[d + 2]) * k[0] * k[0]
-                own, row = own + x * x + y * y + z * z, cuts[c + layout.FIRST] + r
+                turned, row = x * x + y * y + z * z, cuts[c + layout.FIRST] + r
+                own = where(shares, alike(own, turned, LEAST_ALIKE), own + turned)
                 others = kept.compliance[row]
                 least = where((own > 0.0) & (own < others), own, others)
                 kept.compliance[row] = where(contacts | (others == 0.0), others + own, least)
@@ -61,7 +68,7 @@ def weigh_kept_rows(system: System, part: float) -> None:
         least = LEAST_FREE * kept.compliance[j]
         if contacts and kept.compliance[j] == 0.0:  # a row that does not hold
             kept.compliance[j] = 1.0
-        elif contacts:  # what rows share depends on these: as of contacts/equations.py
+        elif contacts:  # what rows share depends on these: as of contacts/equations.py, weigh_alike
             kept.compliance[j] = part * kept.compliance[j]
         else:
             kept.compliance[j] = part * where(least > diagonal, least, diagonal)

@@ -65,8 +65,10 @@ class Record:
 
 
 #: Seconds that general code has taken, by a rough description of the scene, and whether it reported
-#: often; records by identity.
+#: often; records by identity. Seconds that scenes have lost where no program came of it: contacts
+#: in other modes have to take as long before another is tried.
 _spent: dict[Any, float] = {}
+_lost: dict[Any, float] = {}
 _reported: dict[Any, bool] = {}
 _records: dict[str, Record] = {}
 #: Held while a program is made, as several threads may need it at once.
@@ -208,10 +210,12 @@ class ChangeOver:
         with _making:
             record = _records.setdefault(name, Record())
             if record.is_due:
+                clock = time.perf_counter()
                 try:
                     self._make(record, name, modes, start)
                 except Exception as error:  # the general code runs on, whatever it was
-                    record.is_due = False
+                    lost = _lost.get(self._key, 0.0) + time.perf_counter() - clock
+                    _lost[self._key], record.is_due = lost, False
                     record.reason = f"{type(error).__name__}: {error}"
         return record if record.programs else None
 
@@ -225,7 +229,7 @@ class ChangeOver:
         stored = None if path is None else objects.read_object(path)
         if stored is None:
             spent = _spent.get(modes, 0.0)
-            if record.is_requested or spent < MAKE_AFTER:
+            if record.is_requested or spent < max(MAKE_AFTER, _lost.get(self._key, 0.0)):
                 if spent > START_AFTER and BESIDE and path is not None:
                     optimiser.start()
                 return

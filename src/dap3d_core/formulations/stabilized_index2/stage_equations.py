@@ -46,6 +46,7 @@ from dap3d_core.formulations.stabilized_index2.state_tangent import (
 )
 from dap3d_core.kernels.runtime.array_struct import Arrays, IntegerMatrix, Matrix
 from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.linear.ldlt.factor import weigh_alike
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
@@ -137,6 +138,8 @@ def keep_state(system: System, matrix: StageMatrix, part: float) -> None:
             for c in range(o, o + 6):
                 matrix.compliance[f + r] += part * system.D[c] * system.D[c]
             o += 6
+    if part > 0.0 and constraints.slide_sharing(system):
+        weigh_alike(system.blocks, system.D, part, 0.0, matrix.compliance)
     for f in range(matrix.compliance.shape[0] if part > 0.0 else 0):
         if matrix.compliance[f] == 0.0:  # a row that is zero, as of an open contact
             matrix.compliance[f] = 1.0

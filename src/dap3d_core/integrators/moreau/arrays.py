@@ -166,6 +166,7 @@ class StepArrays(Arrays):
     declared_mode: Integers  # first state
     declared_kind: Integers
     declared_turns: Integers  # 1 of moments
+    declared_speed: Floats  # what limits of speeds are multiplied by, m/s or rad/s
     declared_law: Integers  # 1 of those whose law of friction is their own
     declared_mu: Floats  # where it slides, where it sticks
     declared_mu_s: Floats
@@ -363,13 +364,13 @@ def _declared(evaluator: Evaluator) -> dict[str, Any]:
             "declared_mode", "declared_kind", "declared_turns", "declared_law", "declared_under",
             "declared_at", "held", "load_row", "load_count", "load_pushes")},
         **{name: np.zeros(d) for name in (
-            "declared_mu", "declared_mu_s", "declared_e", "grip")},
+            "declared_mu", "declared_mu_s", "declared_e", "declared_speed", "grip")},
         **{name: np.ones(d) for name in ("declared_ratio", "declared_ratio_s", "ratio")},
         "declared_x": np.zeros((d, 7)),
     }  # fmt: skip
     if table is not None:
         found |= {"declared_mode": table.mode, "declared_mu": table.mu, "declared_e": table.e}
-        found |= {"declared_under": table.under}
+        found |= {"declared_under": table.under, "declared_speed": table.speed}
         found |= {"declared_mu_s": table.mu_s, "declared_turns": table.turns.astype(np.int64)}
         found["declared_kind"] = np.where(table.alone, np.where(table.holds[:, 0], WHOLE, ALONE),
                                           CONE)  # fmt: skip

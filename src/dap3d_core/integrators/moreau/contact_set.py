@@ -137,7 +137,7 @@ def put_turned_bias(c: int, s: StepArrays) -> None:
         side, sign = 6, -1.0
     slip[0], slip[1], slip[2] = velocity_of(s, c, s.before)
     zero(more[:3])
-    size = change = 0.0
+    size = change = at_start = turned = 0.0
     for r in range(3):
         u, was = 0.0, 0.0
         for k in range(6):
@@ -151,6 +151,9 @@ def put_turned_bias(c: int, s: StepArrays) -> None:
             size += slip[r] * slip[r]
             slip[r] = u - slip[r]
             change += slip[r] * slip[r]
+            at_start, turned = at_start + was * was, turned + (u - was) * (u - was)
+    if change == 0.0:  # none is expected but that, as in the first step
+        size, change = at_start, turned
     for r in range(1, 3):
         bias[r] = -0.5 * slip[r]
         if change > SLIDES_ON * SLIDES_ON * size:

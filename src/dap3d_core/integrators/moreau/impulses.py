@@ -70,7 +70,7 @@ def recall(work: Any, s: StepArrays) -> None:
         if c >= s.touch_count and c < s.law_count:
             u0, u1, u2 = velocity_of(s, c, s.before)
             u0 = u0 if s.kind[c] == WHOLE else 0.0
-            still = STILL if s.declared_turns[s.key[c] - DECLARED] != 0 else STILL * s.length
+            still = STILL * s.declared_speed[s.key[c] - DECLARED]
             rests = math.sqrt(u0 * u0 + u1 * u1 + u2 * u2) <= still
             put_grip(s, c, rests if row < 0 else memory[row, 4] == STICKS)
 

@@ -19,6 +19,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.formulations.contacts.contact_table import words_of_drive
+from dap3d_core.formulations.contacts.equations import OF_CONTACT, STATE
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators.moreau.arrays import all_room, grown, step_arrays
 from dap3d_core.integrators.moreau.contact_set import POINTS
@@ -72,6 +73,7 @@ class MoreauIntegration(Integration):
     def __init__(self, evaluator: Evaluator, y0: Any, times: Any, **options: Any) -> None:
         """Args: the evaluator of the model; the others as of ``Integration``."""
         self._evaluator = evaluator
+        y0 = without_modes(evaluator, y0) if evaluator.model.contact_count else y0
         options |= {"watched": min(evaluator.watched, 1), "ends": (),
                     "length_count": evaluator.length_count}  # fmt: skip
         options.pop("stop_when_stiff", None)
@@ -215,3 +217,15 @@ class MoreauIntegration(Integration):
     def dy_dt(self) -> Floats | None:
         """None: rates jump with impulses."""
         return None
+
+
+def without_modes(evaluator: Evaluator, y: Any) -> Floats:
+    """The state y as if contacts were open: impulses do what they do, and none besides.
+
+    A start from a result has the modes reported there, and forces that contacts shared.
+    """
+    opened: Floats = np.array(y, dtype=float)
+    first = evaluator.model.integrated_layout["states"].start
+    of_contacts = np.add.outer(evaluator.system.contacts[:, STATE], np.arange(OF_CONTACT))
+    opened[first + of_contacts] = 0.0
+    return opened

@@ -287,25 +287,32 @@ def deepest_of(s: StepArrays) -> float:
 def stay_closed(work: Any, s: StepArrays) -> bool:
     """Mark the contacts that stay closed and move, by velocities ``end`` expected; True if any.
 
+    Those of the first step are the ones of before: slip that begins there is not a step late.
     What joints have moved a contact that pushed by is taken back: gaps to one side alone would
     ask of a body that several contacts carry what none of them allows.
     """
-    found, least = False, TURNING * s.length
+    found, least, begins = False, TURNING * s.length, work.step_count == 0
     for b in range(1, s.end.shape[0]):
         for k in range(6):
-            s.end[b, k] = s.free[b, k] + s.h * work.pushed[b, k]
+            after = s.free[b, k] + s.h * work.pushed[b, k]
+            s.end[b, k] = s.before[b, k] if begins else after
     mark_moved_apart(s)
     for c in range(s.law_count):
         i, j = s.bodies[c, 0], s.bodies[c, 1]
         if s.kind[c] != CONE or s.collides[c] != 0:
             continue
-        if s.slots[impulses.slot_of(work.memory, s.slots, s.key[c])] < 0:
+        if begins:
+            a, d, e = contact_set.velocity_of(s, c, s.before)
+            rests = max(abs(a), abs(d), abs(e)) * s.h <= least
+            if not rests or abs(s.gap[c]) > restitution.OVERLAP * s.length:
+                continue
+        elif s.slots[impulses.slot_of(work.memory, s.slots, s.key[c])] < 0:
             continue
         moved = s.queue[i] + s.queue[j] > 0 and abs(s.gap[c]) <= MOVED_BY_JOINTS * s.length
         if moved and s.hit[max(i, j)] == restitution.NOT_HIT:
             s.bias[c, 0] = s.gap[c] / s.h
         way = s.h * (speed_at(s, i) + speed_at(s, j))
-        if way > least and (is_pushed(work, i) or is_pushed(work, j)):
+        if way > least and (begins or is_pushed(work, i) or is_pushed(work, j)):
             s.collides[c], found = STAYS, True
     return found
 

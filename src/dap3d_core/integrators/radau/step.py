@@ -133,7 +133,7 @@ def step(
         failure = project_state(work, t1, state[at.TRIAL], project, system, loops)
         if failure == at.RUNNING:
             find_slope(t, h, work, given)
-            failure = complete_step(work, t1, h, watch, system, loops)
+            failure = complete_step(work, t1, h, project, watch, system, loops)
         if failure == at.RUNNING:
             failure = step_control.judge_turns(work, t1, accepted, system, loops)
         if failure == step_control.STEP_CUT:
@@ -258,15 +258,16 @@ def safety_factor(work: RadauState) -> float:
 
 @compiled
 def complete_step(
-    work: RadauState, t1: float, h: float, watch: Function, system: System, loops: Any
-) -> int:
+    work: RadauState, t1: float, h: float, project: Function, watch: Function, system: System,
+    loops: Any,
+) -> int:  # fmt: skip
     """Prepare dense output where a reporting time lies in the step; the failure, or RUNNING."""
     slope = work.state[TRIAL_SLOPE]
     if not all_finite(slope):
         return at.NOT_FINITE
     if work.switch_count != 0:
         evaluate(work, t1, work.state[at.TRIAL], at.FOUND, watch, system, loops)
-        if event_location.end_is_across(work, t1, slope, watch, system, loops):
+        if event_location.end_is_across(work, t1, slope, project, watch, system, loops):
             return step_control.STEP_CUT
     if needs_dense(work, t1):
         prepare_dense(h, work)

@@ -418,7 +418,7 @@ def complete_step(
         known = True
     if known and not all_finite(k[result]):
         return at.NOT_FINITE
-    if watched and end_is_across(work, t1, k[result], watch, system, loops):
+    if watched and end_is_across(work, t1, k[result], project, watch, system, loops):
         return step_control.STEP_CUT
     work.first_stage_valid = 1 if known else 0
     return at.RUNNING

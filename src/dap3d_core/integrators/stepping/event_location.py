@@ -86,7 +86,7 @@ def next_length(
     short = with_slopes(short, 0.0)  # as all lengths that are chosen
     if work.switch_count != 0:
         if work.switch_rates_valid == 0:
-            evaluate_start(work, slope, watch, system, loops)
+            evaluate_start(work, slope, project, watch, system, loops)
             if work.end_status != 0:
                 return 0.0
         h = min(h, with_slopes(distance_to_crossing(work, h, short), 0.0))
@@ -193,8 +193,9 @@ def cut_step(work: IntegrationState, row: int, h: float) -> None:
 
 @compiled
 def end_is_across(
-    work: IntegrationState, t1: float, slope: Floats, watch: Function, system: Any, loops: Any
-) -> bool:
+    work: IntegrationState, t1: float, slope: Floats, project: Function, watch: Function,
+    system: Any, loops: Any,
+) -> bool:  # fmt: skip
     """True if the trial state, with dy/dt ``slope``, lies across, or the motion went there.
 
     Then the step is cut. Its switches stand in row FOUND.
@@ -203,7 +204,8 @@ def end_is_across(
     if changes_sign(s, at.FOUND):
         cut_step(work, at.FOUND, h)
         return True
-    find_switch_rates(work, t1, trial, slope, at.FOUND, at.FOUND_RATE, watch, system, loops)
+    rows = at.FOUND, at.FOUND_RATE
+    find_switch_rates(work, t1, trial, slope, rows, project, watch, system, loops)
     if work.cut_attempts >= MAX_SUSPICIONS or h < rate_difference(work):
         return False  # rates over more than the step say nothing of what is within
     part = 1.0

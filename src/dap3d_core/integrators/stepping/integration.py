@@ -173,7 +173,7 @@ class Integration(Restorable):
             crossings=np.zeros((at.LOGGED if count else 0, 3)),
             tolerance=tolerance_of(y.size, atol, kinds),
             stops=stop_table(stops, is_adaptive=step is None),
-            limits=np.array([np.inf, 0.0]),
+            limits=np.array([np.inf, 0.0, *np.zeros(at.MEASURES - at.PROJECTED + length_count)]),
             **self.own_arrays(y.size, length_count),
         )
         work = self.work

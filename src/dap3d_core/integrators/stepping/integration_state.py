@@ -164,12 +164,13 @@ class IntegrationState(Arrays):
     crossings: Matrix  # (LOGGED, 3) where they changed their sign; no row without switches
     tolerance: Matrix  # (TOLERANCES, n)
     stops: Matrix  # (STOP_ROWS, s) instants that no step crosses (break_points.py)
-    limits: Floats  # scalars
+    limits: Floats  # scalars; from LIMITS_END on what project gives of a state beside
 
 
 #: Indices in ``real``: of the first number that project gives, and of the singularity measures.
 PROJECTED = IntegrationState.indices("real")["projection_moved"]
 MEASURES = len(IntegrationState.indices("real"))
+LIMITS_END = len(IntegrationState.indices("limits"))
 #: Scalars that never change in the course of a run.
 REAL_SETTINGS = ("rtol", "fixed_step", "exponent", "beta", "factor_min", "factor_max",
                  "widest_gap_abscissa", "safety", "longest_step")  # fmt: skip

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
+from dap3d_core.assembly.arrays import MODE_ENDS
 from dap3d_core.assembly.evaluate import copy
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.break_points import next_stop, restart
@@ -205,6 +206,23 @@ def report_end(work: Any, report: Function, system: Any, loops: Any) -> bool:
 
 
 @compiled
+def left_of_stop(work: Any, t: float) -> float:
+    """The time to report at: on a stop and just behind it that before it, where there are contacts.
+
+    Their modes are those before it, and one that is about to lift would pull with functions as they
+    are from there on.
+    """
+    stops, k, has_contacts = work.stops, next_stop(work), False
+    if k > 0 and t <= stops[at.BEHIND, k - 1]:
+        k -= 1
+    if k == stops.shape[1] or t < stops[at.INSTANT, k] or t == work.times[0]:
+        return t
+    for q in range(work.switches.shape[1]):
+        has_contacts |= work.switches[at.DOES, q] == MODE_ENDS
+    return stops[at.BEFORE, k] if has_contacts else t
+
+
+@compiled
 def write_row(work: Any, t: float, y: Floats, report: Function, system: Any, loops: Any) -> bool:
     """One row; False, with the status, where it is not finite."""
     n = y.shape[0]
@@ -213,7 +231,7 @@ def write_row(work: Any, t: float, y: Floats, report: Function, system: Any, loo
     for i in range(n):
         row[1 + i] = y[i]
     work.report_count += 1
-    report(t, y, row[1 + n :], system, loops)
+    report(left_of_stop(work, t), y, row[1 + n :], system, loops)
     if not all_finite(row):
         work.t_stop, work.status = t, at.NOT_FINITE
         return False

@@ -1,7 +1,7 @@
 """Continues an integration from arrays of a file, after a check of every number.
 
 Compiled code checks no index. So of a file only what a run changes is taken, and only where it
-lies in the range that is declared next to its definition (integration_state.py, adams/step.py,
+lies in the range that is declared next to its definition (integration_state.py, adams.py,
 radau/state.py); settings and constants are those of the integration that was set up anew.
 """
 

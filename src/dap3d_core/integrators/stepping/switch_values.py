@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import ENDS, JUMPS, SEAM, UNSEEN
+from dap3d_core.assembly.arrays import ENDS, JUMPS, MODE_ENDS, SEAM, UNSEEN
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration_state import Function, IntegrationState
 from dap3d_core.kernels.array_types import Floats
@@ -14,6 +14,8 @@ from dap3d_core.kernels.runtime.cache import compiled
 DIFFERENCE, LEAST_DIFFERENCE = 1e-4, 1e-8
 #: Part of the change over such a difference that a switch may be from zero where it has crossed it.
 JUMPED = 0.01
+#: Part of a rate, towards the end of a mode, that is left on the constraints where it was wrong.
+OFF = 0.5
 #: Bands from a seam, and in a usual step, within which motion follows it.
 ALONG = 1e6
 
@@ -63,7 +65,12 @@ def is_along_seam(work: IntegrationState, k: int) -> bool:
 
 @compiled
 def evaluate_start(
-    work: IntegrationState, slope: Floats, watch: Function, system: Any, loops: Any
+    work: IntegrationState,
+    slope: Floats,
+    project: Function,
+    watch: Function,
+    system: Any,
+    loops: Any,
 ) -> None:
     """Values, sides and rates at the state; the run ends where it should have ended before."""
     s = work.switches
@@ -77,22 +84,52 @@ def evaluate_start(
         if s[at.DOES, k] == ENDS and s[at.SIDE, k] < 0.0:
             work.end_status, work.terminal_switch = at.SWITCHED, k
             record_crossing(work, k, work.t)
-    find_switch_rates(work, work.t, y, slope, at.VALUE, at.RATE, watch, system, loops)
+    rows = at.VALUE, at.RATE
+    find_switch_rates(work, work.t, y, slope, rows, project, watch, system, loops)
     work.switch_rates_valid = 1
 
 
 @compiled
 def find_switch_rates(
-    work: IntegrationState, t: float, y: Floats, slope: Floats, row: int, out: int, watch: Function,
-    system: Any, loops: Any,
+    work: IntegrationState, t: float, y: Floats, slope: Floats, rows: tuple[int, int],
+    project: Function, watch: Function, system: Any, loops: Any,
 ) -> None:  # fmt: skip
-    """Rates of the switches along the slope, by a difference, from their values in a row."""
-    h, x, s = rate_difference(work), work.state[at.OTHER], work.switches
+    """Rates of the switches along the slope, by a difference.
+
+    rows: of their values at y; of their rates.
+    """
+    (row, out), h, x, s = rows, rate_difference(work), work.state[at.OTHER], work.switches
     for i in range(y.shape[0]):
         x[i] = y[i] + h * slope[i]
     evaluate(work, t + h, x, out, watch, system, loops)
+    soon, usual = 0, usual_step(work)
     for k in range(s.shape[1]):
         s[out, k] = (s[out, k] - s[row, k]) / h
+        ahead = s[at.SIDE, k] * (s[row, k] + usual * s[out, k])
+        soon |= (s[at.DOES, k] == MODE_ENDS) & (ahead < 0.0)
+    if soon != 0 and work.projects != 0:
+        correct_rates(work, t + h, x, h, rows, project, watch, system, loops)
+
+
+@compiled
+def correct_rates(
+    work: IntegrationState, t: float, x: Floats, h: float, rows: tuple[int, int],
+    project: Function, watch: Function, system: Any, loops: Any,
+) -> None:  # fmt: skip
+    """Rates of what ends modes, found over a time h to a state x that is off its constraints.
+
+    That is so by the square of h. What joints and contacts hold together slips by it, more than
+    ends such a mode. Other rates keep what they are to rounding, which projection adds to.
+    """
+    s, (row, out), outcome = work.switches, rows, work.limits[at.LIMITS_END :]
+    outcome[0] = outcome[1] = 0.0
+    work.projection_count += 1
+    project(t, x, outcome, system, loops)
+    evaluate(work, t, x, at.SAMPLE, watch, system, loops)
+    for k in range(s.shape[1]):
+        rate, side = (s[at.SAMPLE, k] - s[row, k]) / h, s[at.SIDE, k]
+        if s[at.DOES, k] == MODE_ENDS and side * rate > OFF * side * s[out, k]:
+            s[out, k] = rate
 
 
 @compiled

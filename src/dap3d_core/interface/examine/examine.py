@@ -31,7 +31,6 @@ from dap3d_core.interface.codegen.kernel_arguments import (
     VECTORS,
     VELOCITY_KERNELS,
     KernelArgument,
-    can_be_parameter,
     friction_names,
     namespace,
     parameters,
@@ -39,7 +38,7 @@ from dap3d_core.interface.codegen.kernel_arguments import (
 from dap3d_core.interface.codegen.loop_source import JUMP_KINDS, jump_names, row_count
 from dap3d_core.interface.codegen.reactions import READING, reaction_names
 from dap3d_core.interface.codegen.type_info import TypeInfo
-from dap3d_core.interface.contacts.contact import DECLARED
+from dap3d_core.interface.contacts.contact import DECLARED, SURFACES
 from dap3d_core.interface.derive.derive import CannotDeriveError, derive, missing
 from dap3d_core.interface.element_states import unknown_names
 from dap3d_core.interface.errors import (
@@ -50,7 +49,7 @@ from dap3d_core.interface.errors import (
     no_field,
     where_is,
 )
-from dap3d_core.interface.examine.check_pictures import check_pictures
+from dap3d_core.interface.examine.constants import prepared, set_ends
 from dap3d_core.interface.examine.random_values import (
     numbers,
     random_field,
@@ -58,7 +57,7 @@ from dap3d_core.interface.examine.random_values import (
     random_quantity,
 )
 from dap3d_core.interface.fields import SLOTS, sized_fields, slot_of, specs_of
-from dap3d_core.interface.types import BodyPose, Force, Function, Joint, TypeBase
+from dap3d_core.interface.types import SYMBOLS, Force, Function, Joint, TypeBase
 
 #: Random inputs a type may refuse, or be undefined for, before it counts as broken.
 ATTEMPTS = 200
@@ -82,7 +81,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     has_states = _declares_states(type_, is_abstract=bool(variants))
     rng = random.Random(seed)
     layout = layout_of(type_, _random_constants(type_, rng))
-    check_pictures(type_, layout)
+    _check_pictures(type_, layout)
     _check_named_fields(type_, layout)
     if "reset" in type_.kernels() and not layout.states:
         what = 'defines reset, but no states; add e.g. states = ("z",) and rate'
@@ -205,34 +204,6 @@ def _random_constants(type_: type[TypeBase], rng: random.Random) -> dict[str, An
     ) from refusal
 
 
-def prepared(instance: Any, bodies: Mapping[str, BodyPose]) -> dict[str, Any]:
-    """The constants that ``prepare`` returns for an instance, checked, as tuples of floats.
-
-    Raises:
-        ValueError: the type refuses these values of its fields, in its own words; or they lead to
-            a number that is not finite.
-        PluginError: it failed otherwise, or returned something else than a dict of numbers and
-            tuples of numbers.
-    """
-    type_ = type(instance)
-
-    def broken(reason: str) -> PluginError:
-        return PluginError(f"{where_is(type_)}.prepare {reason}")
-
-    try:
-        constants = instance.prepare(bodies)
-    except ValueError:  # a mistake in the scene, in the type's own words
-        raise
-    except Exception as error:
-        raise broken(f"failed: {type(error).__name__}: {error}") from error
-    if not isinstance(constants, Mapping):
-        raise broken(f"should return a dict; it returned {constants!r}")
-    needed = {n for n, s in specs_of(type_).items() if s.kind == "table" and not s.given}
-    if lacking := sorted(needed - set(constants)):
-        raise broken(f"returns no {', '.join(lacking)}")
-    return {name: _constant(name, value, broken) for name, value in constants.items()}
-
-
 def _check_named_fields(type_: type[TypeBase], layout: InstanceLayout) -> None:
     for word, shapes, what in (
         ("actuates", ((), (3,)), "of a number or of three; name the one that an actuator sets"),
@@ -241,42 +212,6 @@ def _check_named_fields(type_: type[TypeBase], layout: InstanceLayout) -> None:
         field = getattr(type_, word, "")
         if field and layout.numbers.get(field, (0, 0))[1] not in shapes:
             raise PluginError(f"{where_is(type_)}: {word} = {field!r} names no field {what}")
-
-
-def _constant(name: Any, value: Any, broken: Callable[[str], PluginError]) -> Any:
-    if not can_be_parameter(name):
-        raise broken(f"returned {name!r}, which no kernel can name as a parameter")
-    try:
-        constant = _as_floats(value)
-        count = size(checked_shape(constant))
-    except (TypeError, ValueError, OverflowError):
-        count = 0
-    if not count:
-        raise broken(
-            "should return numbers and tuples of numbers or of tuples "
-            f"of one length; {name} is {value!r}"
-        )
-    if not _is_finite(constant):
-        raise ValueError(f"{name} comes out as {value!r}, which is not finite")
-    return constant
-
-
-def set_ends(instance: Any, make: Callable[[], Any]) -> None:
-    """Give an instance with a vector2 field the ends of that vector as attributes P_i and P_j."""
-    if any(spec.kind == "vector2" for spec in specs_of(type(instance)).values()):
-        instance.P_i, instance.P_j = make(), make()
-
-
-def _as_floats(value: Any) -> Any:
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, (tuple, list)):
-        return tuple(_as_floats(v) for v in value)
-    return float(value)
-
-
-def _is_finite(value: Any) -> bool:
-    return all(map(_is_finite, value)) if isinstance(value, tuple) else math.isfinite(value)
 
 
 def _joint_of_friction(type_: type[TypeBase]) -> str:
@@ -340,6 +275,35 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
             if type_.is_contact:
                 name = " and ".join(one for one in DECLARED if getattr(type_, one, None) is None)
             raise PluginError(f"{who} does not define {name}")
+
+
+def _check_pictures(type_: type[TypeBase], layout: InstanceLayout) -> None:
+    """Check the symbol of a type, and the surfaces of a contact.
+
+    Raises:
+        PluginError: there is no such picture, or the type lacks what it is drawn from.
+    """
+    surfaces: Mapping[str, str] = getattr(type_, "surfaces", {})
+    for slot, kind in surfaces.items():
+        declared = f"{where_is(type_)}: surfaces = {{{slot!r}: {kind!r}}}"
+        if slot not in layout.slots or kind not in SURFACES:
+            known = f"bodies are {', '.join(layout.slots)}, surfaces {', '.join(SURFACES)}"
+            raise PluginError(f"{declared}: {known}")
+        if lacking := [n for n in SURFACES[kind] if not {n, f"{n}_{slot}"} & {*layout.numbers}]:
+            words = f"is drawn from {', '.join(lacking)}, which the type does not have"
+            raise PluginError(f"{declared} {words}")
+    if not type_.symbol:
+        return
+    who, symbol = where_is(type_), f"symbol = {type_.symbol!r}"
+    if type_.symbol not in SYMBOLS:
+        raise PluginError(f"{who}: {symbol} is not one of {', '.join(SYMBOLS)}")
+    stored = {name: s.kind for name, s in specs_of(type_).items() if name in layout.numbers}
+    offered = {*layout.slots, *stored, *stored.values()}
+    if lacking := [name for name in SYMBOLS[type_.symbol] if name not in offered]:
+        raise PluginError(
+            f"{who}: {symbol} is drawn from {', '.join(lacking)}, which the type does not have; "
+            'name another symbol, or leave "" to draw what it declares'
+        )
 
 
 def _check_rows(type_: type[Joint]) -> None:

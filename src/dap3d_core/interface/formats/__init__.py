@@ -137,6 +137,9 @@ class Source(Protocol):
     def include(self, name: str, place: Place, base: Path | None = None) -> XmlElement:
         """The root of another file that it names; a cycle is refused."""
 
+    def has(self, name: str, base: Path | None = None) -> bool:
+        """True if a file that it names is there, and may be read."""
+
     def including(self, name: str, base: Path | None = None) -> AbstractContextManager[None]:
         """While what an included file holds is read: it must not include itself."""
 

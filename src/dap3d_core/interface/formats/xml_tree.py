@@ -5,6 +5,7 @@ made. Nothing is fetched.
 """
 
 import math
+import re
 from collections.abc import Iterator
 from typing import Any
 from xml.parsers import expat
@@ -17,6 +18,8 @@ from dap3d_core.interface.formats.remarks import FormatError, Place
 DEEPEST = 200
 #: Larger numbers are refused: no length, mass or angle of a model is, and their powers overflow.
 LARGEST = 1e50
+#: What comes before a declaration, and the declaration.
+_LATE = re.compile(r"\A(?!<\?)(\s*(?:<!--(?:(?!-->).)*-->\s*)*)<\?xml[^>]*\?>", re.DOTALL)
 #: Number of elements beyond which a file is refused.
 MOST_ELEMENTS = 500_000
 
@@ -124,7 +127,8 @@ def numbers_in(
 def parse_xml(text: str | bytes, file: str) -> XmlElement:
     """The root of an XML document.
 
-    Its comments may hold ``--``: XML forbids it, and the readers of Gazebo and MuJoCo allow it.
+    Its comments may hold ``--``, and its declaration may come after blanks and comments: XML
+    forbids it, and the readers of Gazebo and MuJoCo allow it.
 
     Raises:
         FormatError: it is not well-formed, has a document type, or too many or too deep elements.
@@ -147,7 +151,11 @@ def parse_xml(text: str | bytes, file: str) -> XmlElement:
 
 
 def _repaired(text: str) -> str:
-    """The text with an empty comment for each that holds ``--``; lines keep their numbers."""
+    """The text with an empty comment for each that holds ``--``; lines keep their numbers.
+
+    A declaration that does not begin it is left out.
+    """
+    text = _LATE.sub(r"\1", text)
     parts, done = [], 0
     while (start := text.find("<!--", done)) >= 0:
         data = text.find("<![CDATA[", done, start)

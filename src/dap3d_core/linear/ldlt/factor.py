@@ -27,6 +27,7 @@ import numpy as np
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
+from dap3d_core.kernels.scalar_math import where
 from dap3d_core.linear.ldlt.panels import factor_panel, solve_panel_backwards, solve_panel_forwards
 from dap3d_core.linear.ldlt.plan import COPY, DIAGONAL, PRODUCTS, TRANSPOSE
 from dap3d_core.linear.ordering.ordering import LEAST_ROWS
@@ -38,6 +39,9 @@ SINGULAR_PIVOT_RATIO, SINGULAR_NODE_RATIO = 1e-4, 1e-2
 #: Compliance of a row that is zero, as those of an open contact are: its multiplier is zero. A node
 #: of three such rows is passed over.
 IDLE = 1e40
+#: What a row through a corner of a plate moves as a multiple of one through its middle, 1 + 3 + 3.
+#: The least part of the squared length of a row that it then counts with, in passes.
+CORNER, LEAST_ALIKE = 7.0, 0.125
 
 
 @compiled_into
@@ -119,6 +123,39 @@ def weigh_rows(blocks: Integers, D: Floats, part: float, compliance: Floats) -> 
                 s += D[c] * D[c]
             compliance[f + r] += part * s
             o += 6
+
+
+@compiled
+def weigh_alike(blocks: Integers, D: Floats, part: float, least: float, compliance: Floats) -> None:
+    """As ``weigh_rows``, of what moves points by their directions alone, not by where these are.
+
+    Rows that depend on each other share forces as feet of one stiffness do, wherever they stand.
+    least: the part of the squared length that is left at least; less has rounding of its own.
+    """
+    for k in range(compliance.shape[0]):
+        compliance[k] = 0.0
+    for q in range(blocks.shape[0]):
+        o, f = blocks[q, 0], blocks[q, 3]
+        for r in range(blocks[q, 2]):
+            compliance[f + r] += part * square_of_corner(D[o : o + 6], least)
+            o += 6
+
+
+@compiled
+def square_of_corner(row: Floats, least: float) -> float:
+    """The squared length of a row (6,), had it the lever of a corner; its own if it turns alone."""
+    s = row[0] * row[0] + row[1] * row[1] + row[2] * row[2]
+    turning = row[3] * row[3] + row[4] * row[4] + row[5] * row[5]
+    return alike(s, turning, least)
+
+
+@compiled
+def alike(moving: float, turning: float, least: float) -> float:
+    """As ``square_of_corner``, from both parts of the squared length of a row."""
+    own, corner = moving + turning, CORNER * moving
+    return where(
+        (moving > 0.0) & (corner > least * own), corner, where(moving > 0.0, least, 1.0) * own
+    )
 
 
 @compiled

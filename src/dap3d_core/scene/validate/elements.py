@@ -10,7 +10,7 @@ from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.interface.types import acts_on_all
 from dap3d_core.scene.errors import MISSING, Key, dotted, shown
-from dap3d_core.scene.tables import GROUND, LIMITS, RELEASES, ZERO, Element
+from dap3d_core.scene.tables import GROUND, ZERO, Element
 from dap3d_core.scene.validate.coerce_values import (
     READERS,
     Fault,
@@ -30,7 +30,7 @@ from dap3d_core.scene.validate.geometry import (
     two_ends,
     vector_of,
 )
-from dap3d_core.scene.validate.joint_fields import with_joint_fields
+from dap3d_core.scene.validate.joint_fields import keys_beside_fields, with_joint_fields
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.types import Types, completed_type
 from dap3d_core.scene.validate.validated_scene import Instance, arguments_of
@@ -96,9 +96,7 @@ class Reader:
         self.fields = [self._field(name, spec) for name, spec in specs.items()]
         self.kinds = {name: spec.kind for name, spec in specs.items()}
         self.lists = {name: spec for name, spec in specs.items() if spec.size}
-        limits = LIMITS if getattr(type_info.type, "limit", "") else ()
-        releases = RELEASES if table == "joints" else ()
-        self.known = dict.fromkeys([*specs, *self.ends, *limits, *releases])
+        self.known = dict.fromkeys([*specs, *self.ends, *keys_beside_fields(type_info.type)])
         self.of_joints = {name: spec for name, spec in specs.items() if spec.gives}
         # Bodies and points that may be left out follow from the other fields of their slot.
         self.late = [

@@ -14,6 +14,12 @@ from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.validated_scene import Instance
 
 
+def keys_beside_fields(type_: Any) -> tuple[str, ...]:
+    """Keys that a type takes besides its own fields: limits and releases of joints."""
+    limits = LIMITS if getattr(type_, "limit", "") else ()
+    return limits + (RELEASES if type_.kind == "joint" else ())
+
+
 def with_joint_fields(
     report: Collector,
     geometry: Geometry,

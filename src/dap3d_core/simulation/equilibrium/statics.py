@@ -19,7 +19,7 @@ from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.function_lists import call_loop
-from dap3d_core.linear.rank.rank import tolerance_of
+from dap3d_core.linear.rank import tolerance_of
 from dap3d_core.model.element_states import first_states, paths_where, width_of
 from dap3d_core.simulation.errors import AssemblyError, SimulationError
 from dap3d_core.simulation.initial.assemble import fit_of, weights_of

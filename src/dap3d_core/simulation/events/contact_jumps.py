@@ -17,6 +17,7 @@ from dap3d_core.formulations.contacts.contact_table import (
 )
 from dap3d_core.formulations.contacts.decide import (
     DRIVES,
+    HELD,
     OVERLAPS,
     PRESCRIBED,
     WEDGED,
@@ -31,7 +32,7 @@ from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.interface.contacts.rows import APART
-from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.model.state_layout import velocities_of
 from dap3d_core.registry.suggestions import some
 from dap3d_core.result import EventRecord
@@ -45,12 +46,20 @@ from dap3d_core.simulation.events.jumps import LOSSLESS, MOST_RECORDS, Jumps, ro
 TOUCHING_AT_START = 1e-8
 #: Ends of modes within this part of the run: what changes more often comes to no end.
 MOST_CHANGES, WITHIN = 2000, 1e-4
+#: So many of them show whether bodies came behind a surface, where it touches and opens for ever.
+BEHIND = 50
 #: Jams that impulses ended, after which as many changes within this part come to none either.
 MOST_JAMS, RATTLING = 500, 1e-2
 #: So many steps within this part of the run are too many: it would not come to an end.
 MOST_STEPS, SLOW = 10_000, 1e-5
-#: Slip, m/s, that may be stiff.
+#: Stiffness that a change of modes ends within this part of the run, as of slip that turns while it
+#: vanishes, is none of the run.
+SOON = 1e-3
+#: Slip, m/s of an ordinary scene, that may be stiff.
 STIFF_SLIP = 1e-4
+#: Part of the largest mobility that is rounding of one; part of a unit force, or of what it moves,
+#: by which a motion depends on a share.
+UNRESOLVED, DEPENDS = 1e-10, 1e-6
 #: Slip among the numbers of a contact.
 PLANE = slice(SLIP, SLIP + 3)
 #: Records of changes from one mode to another.
@@ -94,7 +103,7 @@ class ContactJumps(Jumps):
         self._latest: deque[tuple[float, str]] = deque(maxlen=MOST_CHANGES)
         #: largest energy, J, that Newton's law has given in an instant; the instant, and contacts
         self._gain: tuple[float, float, str] = (0.0, 0.0, "")
-        #: Names of contacts that slid with unlike friction and shared what they carry.
+        #: Names of contacts that shared what they carry, slid, and moved as they shared it.
         self._sharing: set[str] = set()
 
     @cached_property
@@ -195,7 +204,7 @@ class ContactJumps(Jumps):
             if s.jammed >= 0:
                 self._stood, integration.work.status = (steps, t), Status.JUMPED
                 return
-            if is_slow and not np.any(sliding < STIFF_SLIP):
+            if is_slow and not np.any(sliding < STIFF_SLIP * table.speed):
                 integration.work.status = Status.RUNNING
             if is_slow or is_at_floor or not closed:
                 return
@@ -215,11 +224,12 @@ class ContactJumps(Jumps):
         latest, t = self._latest, integration.t
         latest.append((t, ", ".join(names)))
         passed, jams = t - latest[0][0], self.arrays.freed
-        within = RATTLING if jams > MOST_JAMS else WITHIN
-        if len(latest) < MOST_CHANGES or passed > within * self._span_of(integration):
+        within = (RATTLING if jams > MOST_JAMS else WITHIN) * self._span_of(integration)
+        if len(latest) % BEHIND == 0 and t - latest[-BEHIND][0] <= within:
+            self._refuse_overlap(integration)
+        if len(latest) < MOST_CHANGES or passed > within:
             return
         every = sorted({name for _, some in latest for name in some.split(", ")})
-        self._refuse_overlap(integration, every)
         start = f"the run stopped at t = {t:.9g} s: contacts {', '.join(every)}"
         if jams > MOST_JAMS:
             raise SimulationError(
@@ -233,9 +243,10 @@ class ContactJumps(Jumps):
             "before"
         )
 
-    def _refuse_overlap(self, integration: Integration, names: list[str]) -> None:
+    def _refuse_overlap(self, integration: Integration) -> None:
         """SimulationError where bodies came behind a surface past its end, which lies in them."""
         table, t = self.table, integration.t
+        names = {name for _, some in self._latest for name in some.split(", ")}
         outputs = table.outputs(t, self._state_of(integration))
         depth = np.where(outputs[:, REACH] < 0.0, 0.0, -outputs[:, GAP])
         for c in np.flatnonzero(depth > TOUCHING_AT_START * table.length).tolist():
@@ -244,7 +255,8 @@ class ContactJumps(Jumps):
                     f"the run stopped at t = {t:.9g} s: contact {table.names[c]} begins where its "
                     f"bodies overlap by {depth[c]:.3g} m: they came past an end of its surface, "
                     "beyond which nothing touches. Let the surface begin before that, or give its "
-                    "end a contact of its own (ball_ball, whose radius_i is 0 of an edge)"
+                    "end a contact of its own (ball_ball, whose radius_i is 0 of an edge), or a "
+                    "curve that is a thin wall a depth"
                 )
 
     def notes(self, integration: Integration) -> list[str]:
@@ -260,9 +272,10 @@ class ContactJumps(Jumps):
         if self._sharing:
             found.append(
                 f"contacts {some(sorted(self._sharing))} share what they carry, which bodies leave "
-                "open, and slid with unlike friction: the motion depends on how they share it, "
-                "here so that all are as far inside their cones as can be; give them one mu, or "
-                "let three points touch"
+                "open, and slid in unlike directions or with unlike friction: the motion depends "
+                "on how they share it, here as feet of one stiffness do where that presses all of "
+                "them, else so that all are as far inside their cones as can be; let three points "
+                "touch, or give the body feet on springs"
             )
         if self.count > MOST_RECORDS:
             words = f"contacts changed {self.count} times; the first {MOST_RECORDS} changes are"
@@ -355,9 +368,7 @@ class ContactJumps(Jumps):
         if work > max(LOSSLESS * s.exchanged, self._gain[0]) and np.any(s.newton[struck]):
             self._gain = (work, t, ", ".join(table.names[c] for c in struck))
         self._take_decided(integration, work)
-        share = s.near.any(axis=1)
-        if np.unique(s.mu[share]).size > 1 and self._slide()[share].any():
-            self._sharing |= {table.names[c] for c in np.flatnonzero(share)}
+        self._sharing |= {table.names[c] for c in moved_by_share(s, table.under)}
         after, works = self._after(u), s.work.copy()
         resisting = np.flatnonzero(table.under >= 0)
         np.add.at(works, table.under[resisting], s.work[resisting])
@@ -379,15 +390,16 @@ class ContactJumps(Jumps):
             over = np.flatnonzero(gaps < -limit).tolist()
             raise SceneError([self._overlap(c, -gaps[c]) for c in over])
         start = f"the run stopped at t = {t:.9g} s: contact "
-        if failure == PRESCRIBED:
+        jammed = " with ".join(names[c] for c in np.flatnonzero(s.jams))
+        if failure == PRESCRIBED or (failure == WEDGED and self._is_prescribed()):
+            closes = names[s.culprit] if failure == PRESCRIBED else jammed
             raise SimulationError(
-                f"{start}{names[s.culprit]} closes, and joints or drivers prescribe the motion of "
+                f"{start}{closes} closes, and joints or drivers prescribe the motion of "
                 "its bodies: nothing that it pushes with can stop them"
             )
         if failure == DRIVES:
             mu = min(s.mu[s.culprit], s.mu_s[s.culprit]) * s.arm[s.culprit]
             raise SimulationError(f"{start}{words_of_drive(names[s.culprit], mu)}")
-        jammed = " with ".join(names[c] for c in np.flatnonzero(s.jams))
         if failure == WEDGED:
             is_newton = np.any(s.newton[s.jams != 0])
             remedy = 'Under law = "poisson" it stops' if is_newton else "Smaller mu may help"
@@ -399,6 +411,15 @@ class ContactJumps(Jumps):
             f"{start}{jammed} jams: its friction presses the bodies together by more than it lets "
             "them give way, and no motion with Coulomb's law goes on from here"
         )
+
+    def _is_prescribed(self) -> bool:
+        """Whether joints prescribe that contacts that jam close, together where not each alone."""
+        s, own = self.arrays, len(self.arrays.lam_free)
+        normals = 3 * np.flatnonzero(s.jams)
+        mobility, ways = np.linalg.eigh(s.W[np.ix_(normals, normals)])
+        held = ways[:, mobility <= HELD * np.max(s.W.diagonal())]
+        rates = s.J[own + normals] @ s.v_before
+        return bool(np.linalg.norm(held.T @ rates) > 0.5 * np.linalg.norm(rates) > 0.0)
 
     def _take_decided(self, integration: Integration, work: float) -> None:
         """Make the state ``y``, or the changes that led to it, that of an integration."""
@@ -415,6 +436,8 @@ class ContactJumps(Jumps):
         evaluator, work = self._evaluator, integration.work
         work.state[at.Y] = y
         integration.restart()
+        if 0.0 <= work.t - work.t_stiff < SOON * (work.times[-1] - work.times[0]):
+            work.t_stiff, work.stiff_steps = np.inf, 0
         evaluator.states = states
         evaluator.slope(integration.t, y)
 
@@ -425,3 +448,32 @@ class ContactJumps(Jumps):
         self._record(
             EventRecord(name=name, t=t, direction=0, kind=kind, u=u, u_after=after, work=work)
         )
+
+
+def moved_by_share(s: ContactArrays, under: Integers) -> list[int]:
+    """Contacts that share what they carry, and whose friction moves bodies as they share it.
+
+    What they may carry more or less of, without a change of the rates of their rows, does so with
+    the friction of what slides.
+
+    Args:
+        s: with modes and forces as decided.
+        under: (m,) of what resists rolling, the contact that presses it; else -1.
+    """
+    share = np.flatnonzero(s.near.any(axis=1))
+    if not np.any((s.mode[share] == 1.0) & (s.force[share, 1:].any(axis=1))):
+        return []
+    rows = [3 * c + i for c in share for i in range(3)
+            if (s.mode[c] == 2.0 or i == 0) and (i > 0 or s.gapless[c] == 0.0)]  # fmt: skip
+    with_friction = np.zeros((len(s.W), len(rows)))
+    for k, row in enumerate(rows):
+        with_friction[row, k], c = 1.0, row // 3
+        for of in np.flatnonzero((s.mode == 1.0) & ((under == c) | (np.arange(len(under)) == c))):
+            if row % 3 == 0 and s.force[c, 0] > 0.0:
+                with_friction[3 * of + 1 : 3 * of + 3, k] = s.force[of, 1:] / s.force[c, 0]
+    _, size, across = np.linalg.svd(s.W[rows] @ with_friction)
+    free = with_friction @ across[np.sum(size > UNRESOLVED * size[0]) :].T
+    _, moved, ways = np.linalg.svd(s.moves.T @ free, full_matrices=False)
+    least = DEPENDS * np.max(np.linalg.norm(s.moves, axis=1))
+    carried = np.abs(free @ ways[moved > least].T).max(axis=1, initial=0.0)
+    return [c for c in share.tolist() if carried[3 * c : 3 * c + 3].max() > DEPENDS]

@@ -14,7 +14,8 @@ from dap3d_core.model.rigid_motion import quaternion_product
 from dap3d_core.model.rotations import to_global
 from dap3d_core.model.state_layout import join, split, velocities_of, y_from_u
 
-#: States that are tried, and the largest displacement of a body there, m and rad.
+#: States that are tried, and the largest displacement of a body there, in lengths of
+#: the scene and rad.
 STATES, REACH = 3, 0.1
 #: Central differences of order four, over H seconds at speeds of order one: truncation is of order
 #: H^4, rounding eps / H, of the energy.
@@ -46,12 +47,13 @@ def is_conservative(evaluator: Evaluator, u: Floats) -> bool:
         return False
     if any("energy" not in g.type_info.kernels for g in model.forces):
         return False
-    rng = np.random.default_rng(1)
+    rng, length = np.random.default_rng(1), model.length
     r, p, _, _ = split(u)
     h = H_STATES if model.state_count else H
     for _ in range(STATES):
-        v, w = rng.normal(size=r.shape), rng.normal(size=r.shape)
-        near = _moved(r, p, rng.normal(size=r.shape), rng.normal(size=r.shape), REACH)
+        v, w = length * rng.normal(size=r.shape), rng.normal(size=r.shape)
+        shift, turn = length * rng.normal(size=r.shape), rng.normal(size=r.shape)
+        near = _moved(r, p, shift, turn, REACH)
         power, size, rates = _power(evaluator, join(*near, v, to_global(near[1], w)))
         rate = sum(c * _energy(evaluator, *near, v, w, rates, k * h)
                    for k, c in zip(OFFSETS, WEIGHTS, strict=True)) / h  # fmt: skip

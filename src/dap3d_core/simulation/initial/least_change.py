@@ -13,7 +13,7 @@ from dap3d_core.formulations.arrays import set_metric
 from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.linear.rank.rank import DENSE_ROWS, FEW_ROWS, factor_independent, has_loops
+from dap3d_core.linear.rank import DENSE_ROWS, FEW_ROWS, factor_independent, has_loops
 from dap3d_core.model.rigid_motion import conjugate, quaternion_product, rotation_vector
 from dap3d_core.model.rotations import euler_rates
 from dap3d_core.model.state_layout import join, split, velocities_of

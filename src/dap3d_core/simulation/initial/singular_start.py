@@ -22,7 +22,7 @@ import numpy as np
 from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.linear.rank.rank import DENSE_ROWS, Rank
+from dap3d_core.linear.rank import DENSE_ROWS, Rank
 from dap3d_core.model.state_layout import at_rest, split, velocities_of
 from dap3d_core.registry.suggestions import some
 from dap3d_core.simulation.initial.assemble import max_speed

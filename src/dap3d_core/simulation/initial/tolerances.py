@@ -1,8 +1,7 @@
 """Absolute tolerances of a run, of each quantity: as they are given, else by the scene's scales.
 
-1e-10 (m, 1, m/s, rad/s) suits scenes of metres and seconds. In a scene that is not of ordinary size
-(``Model.length``) it is 1e-10 of its own length, and of the time in which its start would change by
-as much as its size.
+1e-10 (m, 1, m/s, rad/s) suits scenes of metres and seconds. In others it is 1e-10 of their own
+length and time (``Model.length``, ``Evaluator.time``).
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,8 +20,6 @@ from dap3d_core.scene.validate.settings import QUANTITIES, USUAL_ATOL
 
 #: A motion is resolved that is this many times what a step may be off by.
 RESOLVED = 1e3
-#: Times beyond are no scale of a motion, s.
-LONGEST = 1e12
 
 
 def resolved_atol(atol: Any, evaluator: Evaluator) -> float | dict[str, float]:
@@ -49,26 +46,12 @@ def _quantities(evaluator: Evaluator) -> tuple[str, ...]:
 
 def usual_atol(evaluator: Evaluator) -> float | dict[str, float]:
     """Default of the absolute tolerances."""
-    length = evaluator.model.length
-    if length == 1.0:
+    length, time = evaluator.model.length, evaluator.time
+    if length == time == 1.0:
         return USUAL_ATOL
-    time = _time_of(evaluator)
     scales = {"r": length, "p": 1.0, "v": length / time, "w": 1.0 / time, "z": 1.0}
     names = _quantities(evaluator)
     return {name: float(f"{USUAL_ATOL * scales[name]:.6g}") for name in names}
-
-
-def _time_of(evaluator: Evaluator) -> float:
-    """A time of the scene as given, s, as a power of ten: 1 where nothing moves."""
-    model, size = evaluator.model, evaluator.model.part_size
-    _, _, v, w = split(model.u0)
-    _, _, a, alpha = split(evaluator.rhs(0.0, model.u0))
-    rates = [_largest(v) / size, _largest(w)]
-    rates += [np.sqrt(_largest(a) / size), np.sqrt(_largest(alpha))]
-    fastest = float(np.max(rates))
-    if not 1.0 / LONGEST < fastest < LONGEST:
-        return 1.0
-    return float(10.0 ** -np.round(np.log10(fastest)))
 
 
 def motion_notes(low: Floats, high: Floats, settings: Simulation) -> list[str]:
@@ -171,7 +154,8 @@ def atol_notes(given: Any, used: float | Mapping[str, float], evaluator: Evaluat
     """That the usual tolerances were scaled to the scene, in words."""
     if not isinstance(used, Mapping) or (given is not None and {*given} >= {*used}):
         return []
-    if evaluator.model.length == 1.0:
-        return []
-    words = words_of(used)
-    return [f"atol follows the size of the parts, {evaluator.model.part_size:.2g} m: {words}"]
+    model, words = evaluator.model, words_of(used)
+    if model.length != 1.0:
+        return [f"atol follows the size of the parts, {model.part_size:.2g} m: {words}"]
+    slow = f"atol follows the motion, whose time is of the order of {evaluator.time:g} s: {words}"
+    return [slow] if evaluator.time != 1.0 else []

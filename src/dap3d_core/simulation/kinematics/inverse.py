@@ -19,8 +19,6 @@ from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError, refuse_collisions
 from dap3d_core.simulation.failure.monitors import UnilateralMonitor
-from dap3d_core.simulation.kinematics.actuators import Actuator, DriverActuator, actuators_of
-from dap3d_core.simulation.kinematics.closed_contacts import Closed, ContactForces
 from dap3d_core.simulation.kinematics.kinematics import check_output
 from dap3d_core.simulation.kinematics.motion_data import (
     Motion,
@@ -33,6 +31,13 @@ from dap3d_core.simulation.kinematics.pose_equations import (
     Flags,
     held_states,
     required_forces,
+)
+from dap3d_core.simulation.kinematics.unknown_forces import (
+    Actuator,
+    Closed,
+    ContactForces,
+    DriverActuator,
+    actuators_of,
 )
 from dap3d_core.simulation.redundancy.freedoms import motion_words
 from dap3d_core.simulation.redundancy.shared_reactions import refuse_shared, shared_laws
@@ -110,7 +115,7 @@ class Balance:
         """Forces of least norm with N^T B tau nearest to what is needed, and the rank."""
         A, side = self.rows.free.T @ wrenches, self.rows.free.T @ needed
         left, values, right = np.linalg.svd(A, full_matrices=False)
-        longest = np.max(np.linalg.norm(wrenches, axis=0), initial=0.0)
+        longest = np.max(np.linalg.norm(self.rows.unit[:, None] * wrenches, axis=0), initial=0.0)
         rank = int(np.sum(values > RANK * longest))
         return right[:rank].T @ ((left[:, :rank].T @ side) / values[:rank]), rank
 
@@ -207,7 +212,9 @@ class _Forces:
         self.rank, self.freedoms = min(self.rank, balance.rank), max(self.freedoms, free.shape[1])
         self.shares |= balance.shares
         size = float(np.linalg.norm(balance.left))
-        limit = PRODUCED * float(np.linalg.norm(needed)) + FORCE_ROUNDING * inertial
+        unit = balance.rows.unit
+        limit = PRODUCED * float(np.linalg.norm(unit * needed))
+        limit += FORCE_ROUNDING * inertial * float(unit[0])
         if size > limit and (self.missing is None or size > self.missing[0]):
             self.missing = size, t, free @ balance.left
         if not (np.all(np.isfinite(balance.tau)) and np.all(np.isfinite(balance.Lam))):

@@ -30,7 +30,8 @@ from dap3d_core.simulation.redundancy.freedoms import coordinates_of
 
 #: Degree of the splines; the fewest instants, which a spline of degree 3 goes through.
 DEGREE, FEWEST = 5, 4
-#: Changes of m and rad over which quantities are differentiated, and derivatives that are zero.
+#: Changes, in lengths of the scene and rad, over which quantities are differentiated, and
+#: derivatives that are zero.
 SPAN, NOTHING = 1e-5, 1e-7
 #: Passes of the Gauss-Newton iteration, and the change (rad, parts of the model) that ends it.
 MOST_PASSES, SETTLED = 50, 1e-12
@@ -195,7 +196,9 @@ class _Fit:
         self.misfit = dict.fromkeys(data.values, 0.0)
         self._summary = summary_of(evaluator.model)
         self._labels = list(data.values)
-        self._angles: set[str] = set()
+        self._units: dict[str, str] = {}
+        length, n = evaluator.model.length, evaluator.model.body_count
+        self._length, self._spans = length, SPAN * np.tile(np.repeat([length, 1.0], 3), n)
 
     def pose(self, k: int, start: Floats) -> Floats:
         """The state (13 n,), without velocities, at instant k from one near it."""
@@ -213,7 +216,9 @@ class _Fit:
                 self._check_columns(slopes)
             change = -rows.least(rows.rows.C)
             error = (self._gap(target, values) - slopes @ change)[measured]
-            seen = slopes[measured] @ rows.free
+            units = np.array([self._length if self._units[label] == "m" else 1.0
+                              for label in self._labels])[measured]  # fmt: skip
+            seen, error = slopes[measured] @ rows.free / units[:, None], error / units
             self._check_seen(rows, seen, t, u)
             change = change + rows.free @ np.linalg.lstsq(seen, error, rcond=None)[0]
             size = max_speed(self.evaluator, change)
@@ -235,14 +240,19 @@ class _Fit:
     def _quantities(self, t: float, u: Floats) -> tuple[Floats, Floats]:
         """Values (labels,) of the quantities, and slopes (labels, 6 n) by central differences."""
         values = self._values(*self._near(t, u))
-        return values[:, 0], _slopes(values)
+        return values[:, 0], self._slopes(values)
 
     def _near(self, t: float, u: Floats) -> tuple[Floats, Floats]:
         """The state and those on both sides of it, of each motion of a body, and their times."""
-        n = self.evaluator.model.body_count
-        steps = SPAN * np.vstack([np.zeros(6 * n), np.eye(6 * n), -np.eye(6 * n)])
+        one = np.diag(self._spans)
+        steps = np.vstack([0.0 * one[:1], one, -one])
         near = np.array([displaced(u, step) for step in steps])
         return np.full(len(near), t), near
+
+    def _slopes(self, values: Floats) -> Floats:
+        """Central differences (..., 6 n) of values (..., 12 n + 1) at the states of ``_near``."""
+        count = len(self._spans)
+        return (values[..., 1 : count + 1] - values[..., count + 1 :]) / (2.0 * self._spans)
 
     def _of_joints(self, t: float, u: Floats) -> dict[str, Floats]:
         """Slopes (6 n,) of the coordinates of joints, lengths as parts of the model."""
@@ -254,7 +264,7 @@ class _Fit:
                 for k, unit in enumerate(found.units):
                     size = self.evaluator.model.size if unit == "m" else 1.0
                     name = names.get(k, f"q{k + 1}")
-                    slopes[f"{joint}.{name}"] = _slopes(found.q[:, k]) / size
+                    slopes[f"{joint}.{name}"] = self._slopes(found.q[:, k]) / size
         return slopes
 
     def _values(self, t: Floats, u: Floats) -> Floats:
@@ -282,20 +292,20 @@ class _Fit:
         if quantity.values.ndim > 1:
             words = f"name one of its components: {', '.join(quantity.components)}"
             raise SceneError([Mistake(f"motion.{label}", MISSING, words)])
-        if quantity.unit == "rad":
-            self._angles.add(label)
+        self._units[label] = quantity.unit
         return quantity.values
 
     def _gap(self, target: Floats, values: Floats) -> Floats:
         """What is missing to the data, (labels,): of angles the least, whatever their turns."""
         gap = target - values
-        turns = [label in self._angles for label in self._labels]
+        turns = [self._units[label] == "rad" for label in self._labels]
         return np.where(turns, gap - 2.0 * np.pi * np.round(gap / (2.0 * np.pi)), gap)
 
     def _check_columns(self, slopes: Floats) -> None:
         """Refuse quantities that positions do not change: velocities, forces."""
         for label, slope in zip(self._labels, slopes, strict=True):
-            if np.max(np.abs(slope)) <= NOTHING:
+            size = self._length if self._units[label] == "m" else 1.0
+            if np.max(np.abs(slope * self._spans)) <= NOTHING * SPAN * size:
                 words = (
                     "positions do not change this quantity: a motion is given by positions "
                     "(crank.r.x, rod.p.e1, tip.r.z, spring.length); leave the column out"
@@ -318,12 +328,6 @@ class _Fit:
                 f"freedom open: give {names} as well, or other positions that move with the same "
                 "bodies"
             )
-
-
-def _slopes(values: Floats) -> Floats:
-    """Central differences (..., 6 n) of values (..., 12 n + 1) at the states of ``_Fit._near``."""
-    count = values.shape[-1] // 2
-    return (values[..., 1 : count + 1] - values[..., count + 1 :]) / (2.0 * SPAN)
 
 
 def misfit_notes(misfit: Mapping[str, float]) -> list[str]:

@@ -108,7 +108,9 @@ class ChosenRows:
         rows: all rows as they are.
         all_rows: (rows, 6 n) the Jacobian.
         D: (k, 6 n) those chosen, as they are.
-        free: (6 n, f) an orthonormal basis, in m and rad, of the motions that they leave.
+        free: (6 n, f) a basis, in m and rad, of the motions that they leave: orthonormal in lengths
+            of the scene and rad.
+        unit: (6 n,) these lengths, m, and 1 rad.
     """
 
     def __init__(self, evaluator: Evaluator, t: float, u: Floats, chosen: Flags) -> None:
@@ -116,21 +118,23 @@ class ChosenRows:
         self.rows = finite_rows(evaluator, t, u) if len(chosen) else _none(evaluator)
         self.all_rows = self.rows.dense()
         self._chosen, self.D = chosen, self.all_rows[chosen]
-        scaled, gradient = scaled_rows(self.rows, 1.0)
+        length = evaluator.model.length
+        scaled, gradient = scaled_rows(self.rows, length)
         self._gradient = gradient[chosen]
         left, values, right = np.linalg.svd(scaled.dense()[chosen])
         rank = int(np.sum(values > RANK))
         self._left, self._values, self._right = left[:, :rank], values[:rank], right[:rank]
-        self.free: Floats = right[rank:].T
+        self.unit = np.tile(np.repeat([length, 1.0], 3), evaluator.model.body_count)
+        self.free: Floats = self.unit[:, None] * right[rank:].T
 
     def least(self, side: Floats) -> Floats:
         """(6 n,) the least x with D x = side, side (rows,) of all rows."""
         scaled = self._left.T @ (side[self._chosen] / self._gradient)
-        return self._right.T @ (scaled / self._values)
+        return self.unit * (self._right.T @ (scaled / self._values))
 
     def onto(self, x: Floats, side: Floats) -> Floats:
         """The x (6 n,) nearest to one given with D x = side."""
-        return self.free @ (self.free.T @ x) + self.least(side)
+        return self.free @ (self.free.T @ (x / self.unit**2)) + self.least(side)
 
     def residual(self, x: Floats, side: Floats) -> float:
         """Largest |D x - side|."""

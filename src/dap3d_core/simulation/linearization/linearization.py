@@ -8,23 +8,23 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.linear.rank.rank import Dependency
+from dap3d_core.linear.rank import Dependency
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result, information
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
-from dap3d_core.simulation.linearization.eigenvalues import (
-    Complex,
-    Eigenvalues,
-    eigenvalues_of,
-    order_of,
-)
-from dap3d_core.simulation.linearization.frequency_response import response
 from dap3d_core.simulation.linearization.inputs import inputs_of, output_derivatives
 from dap3d_core.simulation.linearization.mode_motion import mode_motion
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint, operating_point
 from dap3d_core.simulation.linearization.scaled_equations import ScaledEquations
+from dap3d_core.simulation.linearization.state_matrices import (
+    Complex,
+    Eigenvalues,
+    eigenvalues_of,
+    order_of,
+    response,
+)
 from dap3d_core.simulation.linearization.state_space import DriverRows, StateSpace, state_space
 from dap3d_core.simulation.linearization.steady_motion import independent_rows
 

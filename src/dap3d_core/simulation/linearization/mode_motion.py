@@ -10,8 +10,8 @@ from dap3d_core.model.state_layout import join, split, velocities_of
 from dap3d_core.result import Result, RunMetadata, information
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial.assemble import correct_initial
-from dap3d_core.simulation.linearization.eigenvalues import Complex
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint
+from dap3d_core.simulation.linearization.state_matrices import Complex
 
 #: Largest rotation of a body that is shown, rad.
 MOST_TURN = 0.5

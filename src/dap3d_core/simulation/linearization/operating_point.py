@@ -13,7 +13,7 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.interface.codegen.reactions import reaction_names
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.linear.rank.rank import Rank, dense_rank
+from dap3d_core.linear.rank import Rank, dense_rank
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import join
 from dap3d_core.result import Result, information
@@ -30,9 +30,9 @@ from dap3d_core.simulation.linearization.tangent import TangentMatrices, tangent
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of
 from dap3d_core.simulation.settings import compile_exact
 
-#: Residuals of the constraints beyond this make a state unfit, in m and m/s.
+#: Residuals of the constraints beyond this make a state unfit, in m and m/s of an ordinary scene.
 OFF_CONSTRAINTS = 1e-6
-#: A switch this close to zero is at its point of change.
+#: A switch this close to zero is at its point of change, in lengths of the scene.
 AT_SWITCH = 1e-9
 #: Rates of states below this part of their terms are zero.
 STEADY_STATES = 1e-8
@@ -254,7 +254,8 @@ def _refuse_changed(scene: Scene, result: Result, t: float) -> None:
 def _check(evaluator: Evaluator, t: float, u: Floats) -> None:
     """Refuses a state off the constraints, or at a switch."""
     position, velocity = violation(evaluator, u, t)
-    if max(position, velocity) > OFF_CONSTRAINTS:
+    length = evaluator.model.length
+    if max(position, velocity * evaluator.time) > OFF_CONSTRAINTS * length:
         raise SimulationError(
             f"the state is off the constraints (position {position:.2g}, velocity {velocity:.2g}): "
             "equations of motion cannot be linearised there; correct it, or take a state of a run"
@@ -266,7 +267,7 @@ def _check(evaluator: Evaluator, t: float, u: Floats) -> None:
     with evaluator.coordinates.at(u) as y:
         watch(t, y, values, evaluator.system, evaluator.loops)
     k = int(np.argmin(np.abs(values)))
-    if abs(values[k]) <= AT_SWITCH:
+    if abs(values[k]) <= AT_SWITCH * length:
         switch = evaluator.switches[k]
         raise SimulationError(
             f"the state is at a switch of {switch.name(evaluator.model)} (its value is "

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.linear.rank.rank import Dependency
+from dap3d_core.linear.rank import Dependency
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import rotation, skew
 from dap3d_core.model.state_layout import split

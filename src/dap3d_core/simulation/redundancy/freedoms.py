@@ -7,7 +7,7 @@ import numpy as np
 from dap3d_core.formulations.constraint_rows import scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.linear.rank.rank import DENSE_ROWS
+from dap3d_core.linear.rank import DENSE_ROWS
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import euler_rates
 from dap3d_core.model.state_layout import split

@@ -19,7 +19,7 @@ import numpy as np
 from dap3d_core.formulations.constraint_rows import ConstraintRows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.linear.rank.rank import DENSE_ROWS
+from dap3d_core.linear.rank import DENSE_ROWS
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import coordinates_of, velocities_of
 from dap3d_core.simulation.errors import AssemblyError

@@ -9,7 +9,7 @@ import numpy as np
 from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.linear.rank.rank import FEW_ROWS, WEIGHT, Dependency, Rank, dense_rank, sparse_rank
+from dap3d_core.linear.rank import FEW_ROWS, WEIGHT, Dependency, Rank, dense_rank, sparse_rank
 from dap3d_core.model import Model
 from dap3d_core.registry.suggestions import some
 from dap3d_core.simulation.initial.assemble import fit_of
@@ -18,7 +18,7 @@ from dap3d_core.simulation.initial.singular_start import SingularStart, singular
 from dap3d_core.simulation.redundancy.near_redundant import Binding, bindings
 
 #: Redundant rows whose combination misses zero by more than this contradict each other: per unit of
-#: the largest right-hand side, where that is above one.
+#: the largest right-hand side, where that is above one (in the time of the scene).
 CONSISTENT = 1e-8
 #: Velocities this far off the constraints say nothing of the acceleration level.
 MOVING_ALONG = 1e-6
@@ -73,11 +73,6 @@ class ReactionUniqueness:
     unique_rows: tuple[int, ...]
     force: str
     moment: str
-
-    @property
-    def partly(self) -> bool:
-        """True if some component is unique."""
-        return bool(self.unique_rows or self.force or self.moment)
 
     def describe(self) -> str:
         """Text on the unique components."""
@@ -223,7 +218,7 @@ def redundancy_of(evaluator: Evaluator, u: Floats, t: float = 0.0) -> Redundancy
         tuple(model.joint_names[k] for k in involved),
         max((_size(d, rows.nu, gradient) for d in rank.dependencies), default=0.0),
         _groups(model, rank.dependencies),
-        tuple(_contradictions(model, rank.dependencies, rows, gradient, u)),
+        tuple(_contradictions(evaluator, rank.dependencies, rows, gradient, u)),
         binding,
         singular_start(evaluator, u, rank, t) if rank.redundant and not binding else None,
         model,
@@ -290,7 +285,7 @@ def _size(dependency: Dependency, side: Floats, gradient: Floats) -> float:
 
 
 def _contradictions(
-    model: Model,
+    evaluator: Evaluator,
     dependencies: Sequence[Dependency],
     rows: ConstraintRows,
     gradient: Floats,
@@ -298,28 +293,30 @@ def _contradictions(
 ) -> list[Contradiction]:
     """At each level, where the one below leaves it a meaning."""
     found: list[Contradiction] = []
+    model, time = evaluator.model, evaluator.time
     if not dependencies:
         return found
     v = u[-rows.shape[1] :] / np.tile(np.repeat([model.length, 1.0], 3), model.body_count)
     off = rows.product(v) - rows.nu
-    moving_along = float(np.max(np.abs(off))) <= MOVING_ALONG * max(1.0, float(np.max(np.abs(v))))
+    fastest = max(1.0 / time, float(np.max(np.abs(v))))
+    moving_along = float(np.max(np.abs(off))) <= MOVING_ALONG * fastest
     for dependency in dependencies:
-        open_ = _judged(model, dependency, rows.C, gradient, "position")
+        open_ = _judged(model, dependency, rows.C, gradient, "position", 1.0)
         gap = np.linalg.norm(_gap(dependency, rows.C))
         if open_ and gap > 0.5 * np.linalg.norm(rows.C[dependency.rows]):
             found.append(open_)
-        level = _judged(model, dependency, rows.nu, gradient, "velocity")
+        level = _judged(model, dependency, rows.nu, gradient, "velocity", 1.0 / time)
         if not level and moving_along and not open_:
-            level = _judged(model, dependency, rows.gamma, gradient, "acceleration")
+            level = _judged(model, dependency, rows.gamma, gradient, "acceleration", time**-2)
         found += [level] if level else []
     return found
 
 
 def _judged(
-    model: Model, dependency: Dependency, side: Floats, gradient: Floats, level: str
+    model: Model, dependency: Dependency, side: Floats, gradient: Floats, level: str, least: float
 ) -> Contradiction | None:
     gap = _gap(dependency, side)
-    size, limit = float(np.linalg.norm(gap)), CONSISTENT * max(1.0, float(np.max(np.abs(side))))
+    size, limit = float(np.linalg.norm(gap)), CONSISTENT * max(least, float(np.max(np.abs(side))))
     if size <= limit:
         return None
     missed = np.abs(gap @ dependency.combinations)

@@ -182,7 +182,9 @@ class SteppedRun:
         """
         with self._lock:
             log, t = self._log, self.t
-            record = self._run.record("stopped" if self._failure else "done")
+            run = self._run
+            notes = [] if run.jumps is None else run.jumps.notes(run.present)
+            record = run.record("stopped" if self._failure else "done", notes)
             more = {"t_end": t, "dt": None, "controllers": ["steps of a script"]}
             record = attrs.evolve(record, settings=record.settings | more)
             log.add(t)

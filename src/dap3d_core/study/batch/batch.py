@@ -95,7 +95,7 @@ class BatchRunner:
         with contextlib.suppress(NotCopiedError):
             parameter_map = ParameterMap(compiled.checked, evaluator, parameters)
             has_start = evaluator.coordinates.are_of_bodies or parameter_map.keeps_poses
-            if compiled.model.length != 1.0:
+            if not compiled.model.length == evaluator.time == 1.0:
                 has_start = False  # weights of rows follow the poses, tolerances the motion
             if has_start and (not parameter_map.moves_start or self._has_compiled_correction()):
                 self.parameter_map = parameter_map

@@ -32,7 +32,7 @@ from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import A, W
 from dap3d_core.kernels.scalar_math import is_differentiated, with_slopes
 from dap3d_core.linear.ldlt.factor import SINGULAR_PIVOT_RATIO, assemble, factor, weigh_rows
-from dap3d_core.linear.rank.rank import PIVOT_TOLERANCE
+from dap3d_core.linear.rank import PIVOT_TOLERANCE
 from dap3d_core.simulation.initial.assemble import (
     FIT,
     MOST_PASSES,

@@ -19,7 +19,7 @@ from dap3d_core.formulations.arrays import mass_flags, set_metric
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.interface.element_states import INITIAL, TOLERANCE
-from dap3d_core.interface.examine.examine import prepared
+from dap3d_core.interface.examine.constants import prepared
 from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.interface.types import BodyPose, Function, TypeBase, acts_on_all, turns_of
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS

@@ -14,6 +14,7 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import EVEN, LENGTH, WEAK
 from dap3d_core.formulations.coordinates import UnsuitableError
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators.stepping.integration_state import BEFORE, INSTANT
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.array_struct import Arrays
@@ -251,13 +252,13 @@ def floats_of(run: Run) -> dict[str, Floats]:
 def _are_alike(one: Run, other: Run) -> bool:
     """True if the arrays of two runs are of the same sizes, and the same steps end at breaks.
 
-    The length that tolerances speak of, and flags of masses, are the same: they jump with a number.
+    The scales that tolerances speak of, and flags of masses, are the same: they jump with a number.
     Directions that types have chosen (``normals``) are those of the one, turned a little.
     """
     shapes = [[(name, array.shape) for name, array in arrays_of(run)] for run in (one, other)]
     if shapes[0] != shapes[1]:
         return False
-    scales = [run.evaluator.system.settings[[LENGTH, EVEN, WEAK]] for run in (one, other)]
+    scales = [_scales(run.evaluator) for run in (one, other)]
     stops = [run.present.work.stops for run in (one, other)]
     jumps = [table[BEFORE] < table[INSTANT] for table in stops]
     directions = [_vectors(run) for run in (one, other)]
@@ -266,6 +267,13 @@ def _are_alike(one: Run, other: Run) -> bool:
     has_turned = np.any(is_unit[0] & is_unit[1] & (turns > TURNED))
     same = np.array_equal(jumps[0], jumps[1]) and np.array_equal(scales[0], scales[1])
     return same and not has_turned
+
+
+def _scales(evaluator: Evaluator) -> Floats:
+    """Those of a scene, its flags of masses, and the masses by which contacts measure forces."""
+    units = [group.number("unit_mass") for group in evaluator.model.contacts]
+    own = evaluator.system.settings[[LENGTH, EVEN, WEAK]]
+    return np.concatenate([own, [evaluator.time], *units])
 
 
 def _vectors(run: Run) -> Floats:

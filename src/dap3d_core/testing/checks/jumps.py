@@ -8,8 +8,8 @@ from dap3d_core.interface.fields import specs_of
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.rotations import rotation
 from dap3d_core.testing.checks.compare import Comparison, body_words, rates
+from dap3d_core.testing.checks.elements import rigid_motion
 from dap3d_core.testing.checks.findings import CheckOutcome
-from dap3d_core.testing.checks.forces import rigid_motion
 from dap3d_core.testing.samples.random_state import Direction, State
 from dap3d_core.testing.samples.sampled_type import Sample, SampledType
 

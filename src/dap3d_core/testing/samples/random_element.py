@@ -19,7 +19,7 @@ from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, kernels_of
 from dap3d_core.interface.codegen.reactions import sample_size
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import where_is
-from dap3d_core.interface.examine.examine import prepared, set_ends
+from dap3d_core.interface.examine.constants import prepared, set_ends
 from dap3d_core.interface.examine.random_values import numbers, random_field
 from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.interface.types import BodyPose, pose

@@ -7,7 +7,7 @@ from support.internals import Pose, classify, compose
 from support.joint_pairs import BETWEEN, STANDARD, compiled_pair, pair
 
 from dap3d_core.simulation import CompiledModel
-from dap3d_core.testing.checks.motion import axis_words, motion_words
+from dap3d_core.testing.checks.joints import axis_words, motion_words
 
 #: C of lengths of 1 m to 3 m: some hundred operations of relative error 1e-16.
 ROUNDING = 1e-13

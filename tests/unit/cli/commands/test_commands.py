@@ -7,12 +7,13 @@ import shutil
 import subprocess
 import sys
 import threading
+from functools import partial
 
 import numpy as np
 import pytest
 from support.command_line import dap3d
 from support.falling import SCENE
-from support.process import REPOSITORY
+from support.process import REPOSITORY, together
 from tests.e2e.conftest import COMMAND, environment
 
 import dap3d_core as dap
@@ -347,11 +348,7 @@ def test_of_two_that_write_one_file_at_once_one_wins_whole(tmp_path):
 
     for k in range(50):
         target, barrier = tmp_path / f"{k}.nc", threading.Barrier(2)
-        both = [threading.Thread(target=write, args=(target, text, barrier)) for text in texts]
-        for thread in both:
-            thread.start()
-        for thread in both:
-            thread.join()
+        together(*(partial(write, target, text, barrier) for text in texts))
         assert target.read_text() in texts
     assert len(told) == 50
     assert all("exists" in words for words in told)
@@ -360,25 +357,15 @@ def test_of_two_that_write_one_file_at_once_one_wins_whole(tmp_path):
 
 def test_of_several_that_overwrite_one_file_at_once_none_disturbs_another(tmp_path):
     """With force each of them succeeds, and the file is always that of one of them, whole."""
-    target, errors, texts = tmp_path / "run.nc", [], [letter * 5000 for letter in "abcd"]
-    barrier = threading.Barrier(len(texts))
+    target, texts = tmp_path / "run.nc", [letter * 5000 for letter in "abcd"]
 
     def write(text):
-        barrier.wait()
-        try:
-            for _ in range(100):
-                with whole_file(target, force=True) as part:
-                    part.write_text(text)
-                assert target.read_text() in texts
-        except Exception as error:
-            errors.append(error)
+        for _ in range(100):
+            with whole_file(target, force=True) as part:
+                part.write_text(text)
+            assert target.read_text() in texts
 
-    threads = [threading.Thread(target=write, args=(text,)) for text in texts]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert not errors
+    together(*(partial(write, text) for text in texts))
     assert list(tmp_path.iterdir()) == [target]
 
 

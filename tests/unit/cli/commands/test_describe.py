@@ -92,6 +92,8 @@ def test_the_freedoms_that_joints_leave():
         ("friction", ["the bodies of its joint"]),
         ("cable", ["the bodies of points"]),
         ("rev", ["called revolute, hinge, pin elsewhere"]),
+        ("rev", ["also takes lower, upper, e, breaks_at, active"]),
+        ("sph", ["also takes breaks_at, active"]),
         # states by name, with the fields that come with them
         ("maxwell", ["states z; initial values by fields in _0, tolerances by fields in _atol",
                      "z_atol"]),

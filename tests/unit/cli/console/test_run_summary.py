@@ -5,7 +5,14 @@ import pytest
 from support.internals import join
 
 from dap3d_core.cli.console.console import stdout
-from dap3d_core.cli.console.run_summary import MOST_BODIES, correction_data, show_correction
+from dap3d_core.cli.console.run_summary import (
+    MOST_BODIES,
+    MOST_EVENTS,
+    MOST_OF_FILE,
+    correction_data,
+    show_correction,
+    show_details,
+)
 
 
 def corrected(shifts):
@@ -49,3 +56,14 @@ def test_of_many_bodies_those_that_were_changed_most_are_printed(printed):
     assert "and 45 bodies more, changed less; --json prints all" in text
     assert len(text.splitlines()) < 40
     assert len(initial["changed_bodies"]) == len(initial["bodies"]) == 50
+
+
+def test_after_a_run_a_few_events_are_printed_and_of_a_file_many(capsys):
+    events = [{"text": f"t = {k} s: lift of floor"} for k in range(10)]
+    data = {"events": events, "ledger": {}, "notes": [], "method": "lsq"}
+    show_details(stdout(), data)
+    text = capsys.readouterr().out
+    assert text.count("lift") == MOST_EVENTS
+    assert "and 4 more, which dap3d info lists" in text
+    show_details(stdout(), data, MOST_OF_FILE)
+    assert capsys.readouterr().out.count("lift") == 10

@@ -1,5 +1,7 @@
 """Runs by a program of the scene's own: the same bits, and general code where it does not fit."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from support.internals import change_over, scene_program
@@ -8,6 +10,7 @@ from support.plain import jit_is_on
 import dap3d_core as dap
 from dap3d_core.formulations import PROJECT, REPORT, RHS, WATCH
 from dap3d_core.integrators import EXPLICIT
+from dap3d_core.kernels.compiler.trace import TraceError
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 SETTINGS = {"t_end": 0.3, "rtol": 1e-9, "atol": 1e-11}
@@ -16,7 +19,7 @@ SETTINGS = {"t_end": 0.3, "rtol": 1e-9, "atol": 1e-11}
 @pytest.fixture
 def records(monkeypatch):
     """Records of scenes, none of which is known yet."""
-    for name in ("_records", "_spent", "_reported"):
+    for name in ("_records", "_spent", "_lost", "_reported"):
         monkeypatch.setattr(change_over, name, {})
     return change_over._records
 
@@ -241,6 +244,23 @@ def test_a_scene_without_program_runs(at_once, monkeypatch):
     assert_same(dap.simulate("pen1", **SETTINGS), general("pen1"))
     [record] = at_once.values()
     assert "more than 10 instructions" in record.reason
+
+
+def test_modes_of_a_scene_without_program_try_no_more_than_they_take(at_once, monkeypatch):
+    """Boxes on boxes lost six seconds for each set of modes, which general code had run by then."""
+    clock, tried = [0.0], []
+
+    def fail(*given):
+        tried.append(given)
+        clock[0] += 6.0
+        raise TraceError("takes more than 22000 instructions")
+
+    monkeypatch.setattr(scene_program, "write_programs", fail)
+    monkeypatch.setattr(scene_program, "path_of", lambda name: None)
+    monkeypatch.setattr(change_over, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
+    result = dap.simulate(sliding_rod(), **SETTINGS)
+    assert {"stick"} <= {event.kind for event in result.events}
+    assert len(tried) == 1
 
 
 def test_short_runs_make_none(records):

@@ -99,7 +99,7 @@ NOT_CALLED = {
     for module, names in {
         "formulations.common.constraints": "linearise_evenly",
         "formulations.standard": "settle_rows",
-        "integrators.adams.step": "reject",
+        "integrators.adams": "reject",
         "integrators.stepping.vector_ops": "scaled_beyond",
         "integrators.runge_kutta.sums": "combine_by_table error_beyond_rounding",
         "integrators.stepping.singular_poses": "predict_measures is_approaching "
@@ -115,7 +115,7 @@ NOT_CALLED = {
         "integrators.runge_kutta.step": "is_rounding",
         "integrators.stepping.event_location": "cut_step is_sample_across put_rates_before",
         "integrators.stepping.switch_values": "first_across has_jumped",
-        "linear.rank.null_space": "solve_each",
+        "linear.rank": "solve_each",
         "study.batch.initial_state": "keep put_back",  # of differentiated code
         # of jumps with closed forms: unit/formulations/jumps, unit/simulation/events
         "formulations.jumps.multipliers": "rotate seek_active",

@@ -3,14 +3,14 @@
 import ctypes
 import os
 import resource
-import threading
+from functools import partial
 from itertools import count
 
 import numpy as np
 import pytest
 from support.internals import FLOAT, Array, Program, Signature, background, objects, units
 from support.plain import jit_is_on
-from support.process import run, start
+from support.process import run, start, together
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 
@@ -153,13 +153,8 @@ def test_a_process_beside_makes_code_well(tmp_path, monkeypatch):
 
 
 def test_threads_may_ask_for_one_function_at_once(tmp_path, alone):
-    entry, found = entry_of(tmp_path), []
-    threads = [threading.Thread(target=lambda: found.append(answer(entry))) for _ in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert found == [42.0] * 8
+    entry = entry_of(tmp_path)
+    assert together(*[partial(answer, entry)] * 8) == [42.0] * 8
 
 
 RUN = """

@@ -53,8 +53,22 @@ def test_a_driver_that_goes_on_into_a_limit_is_named_with_the_contact():
         dap.simulate(scene, t_end=1.0)
 
 
-def test_a_body_behind_a_surface_that_begins_in_it_is_named_with_the_depth(monkeypatch):
-    monkeypatch.setattr(contact_jumps, "MOST_CHANGES", 4)
+@pytest.mark.parametrize("mu", [0.0, 0.5])
+def test_a_winch_that_lowers_a_box_into_the_floor_is_told_from_friction_that_jams(mu):
+    """Each corner alone could give way; all of them together cannot."""
+    scene = dap.Scene(name="winch")
+    scene.add_body("box", mass=400.0, Jp=(60.0, 60.0, 60.0), r=(0.0, 0.0, 1.0))
+    top = scene.add_point("top", "ground", (0.0, 0.0, 10.0))
+    scene.add_function("a", "pays", coeff=(0.0, 1.0, 0.0))
+    scene.add_joint("cable", "rope", points=[top, "box.O"], function="pays")
+    scene.add_contact("box_plane", "floor", body_i="box", size=(1.0, 1.0, 1.0), mu=mu)
+    with pytest.raises(
+        dap.SimulationError, match=r"t = 0\.5 s: contact floor#1.*drivers prescribe"
+    ):
+        dap.simulate(scene, t_end=1.0)
+
+
+def test_a_body_behind_a_surface_that_begins_in_it_is_named_with_the_depth():
     scene = dap.Scene(name="under a shelf")
     scene.add_body("ball", mass=1.0, r=(-0.5, -0.2, 0.0), r_dot=(1.0, 0.0, 0.0))
     scene.add_function("a", "x", coeff=(0.0, 1.0, 0.0))

@@ -67,9 +67,9 @@ def test_a_row_of_four_bars_has_three_redundant_rows_a_loop(way, monkeypatch):
     N = 8
     monkeypatch.setattr("dap3d_core.simulation.redundancy.redundancy.FEW_ROWS", 0)
     if way != "svd of parts":
-        monkeypatch.setattr("dap3d_core.linear.rank.rank.PART_ROWS", 0)
+        monkeypatch.setattr("dap3d_core.linear.rank.PART_ROWS", 0)
     if way == "inverse iteration":
-        monkeypatch.setattr("dap3d_core.linear.rank.rank.by_elimination", lambda problem, K: None)
+        monkeypatch.setattr("dap3d_core.linear.rank.by_elimination", lambda problem, K: None)
     found = dap.compile(four_bar_row(N, 0.3)).redundancy()
     assert found.rank.method == way
     counts = (found.rank.rows, found.rank.rank, found.rank.redundant, found.rank.dof)
@@ -91,7 +91,7 @@ def test_what_hangs_on_a_loop_takes_no_part(monkeypatch):
     """A pendulum on each coupler of a row of four-bars adds five independent rows and a freedom
     each; elimination still is a proof, and the pendulums' reactions are unique."""
     monkeypatch.setattr("dap3d_core.simulation.redundancy.redundancy.FEW_ROWS", 0)
-    monkeypatch.setattr("dap3d_core.linear.rank.rank.PART_ROWS", 0)
+    monkeypatch.setattr("dap3d_core.linear.rank.PART_ROWS", 0)
     scene = four_bar_row(4, 0.3)
     for k in range(1, 5):
         r = np.add(scene.bodies[f"coupler{k}"].r, (0.0, -0.5, 0.0))
@@ -249,7 +249,6 @@ def test_reactions_outside_of_a_group_are_unique():
     """The hinges of a door share everything; the leaf folded onto it has one hinge: unique."""
     found = dap.compile(door()).redundancy()
     assert found.unique_joints == ("fold",)
-    assert [r.partly for r in found.reactions()] == [False, False]
     assert found.describe_reactions() == ["not unique: lower, upper", "unique: fold"]
 
 

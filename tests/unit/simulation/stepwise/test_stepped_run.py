@@ -1,11 +1,10 @@
 """Runs that a script takes step by step."""
 
-import threading
-
 import numpy as np
 import pytest
 from support.arm import NAMES, arm_scene
 from support.plain import long_in_plain_python
+from support.process import together
 from support.pushed import feedback, held, pushed_block
 
 import dap3d_core as dap
@@ -181,21 +180,13 @@ def test_threads_take_turns_in_a_run():
     alone = dap.start("pen1")
     for _ in range(60):
         alone.step(0.01)
-    shared, failures = dap.start("pen1"), []
+    shared = dap.start("pen1")
 
     def work():
-        try:
-            for _ in range(15):
-                shared.step(0.01)
-        except Exception as error:
-            failures.append(error)
+        for _ in range(15):
+            shared.step(0.01)
 
-    threads = [threading.Thread(target=work) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert not failures
+    together(*[work] * 4)
     found, wanted = shared.result(), alone.result()
     np.testing.assert_array_equal(found.t, wanted.t)
     np.testing.assert_array_equal(found.u, wanted.u)

@@ -10,7 +10,7 @@ whose notation this is written) and III.7.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -25,8 +25,10 @@ from dap3d_core.integrators.stepping.event_location import (
     next_length,
     update_switches_after_step,
 )
+from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.integration_state import Function, IntegrationState
 from dap3d_core.integrators.stepping.output import project_state
+from dap3d_core.integrators.stepping.restore import restored
 from dap3d_core.integrators.stepping.rounding import record_failure
 from dap3d_core.integrators.stepping.switch_values import evaluate
 from dap3d_core.integrators.stepping.vector_ops import all_finite, scaled_beyond, scaled_largest
@@ -291,7 +293,7 @@ def step(work: AdamsState, functions: Any, system: Any, loops: Any) -> None:
         failure = project_state(work, t1, trial, project, system, loops)
         if failure != at.RUNNING:
             reject(work, t1, h, 1, 0.1, failure)
-        elif complete_step(work, t1, rhs, watch, system, loops):
+        elif complete_step(work, t1, rhs, project, watch, system, loops):
             if step_control.turns_are_certain(work, t1, accepted, system, loops):
                 accept(work, t1, k, here, below, lower)
             else:
@@ -327,8 +329,9 @@ def error_of(work: AdamsState, t1: float, h: float, k: int, size: float) -> floa
 
 @compiled
 def complete_step(
-    work: AdamsState, t1: float, rhs: Function, watch: Function, system: Any, loops: Any
-) -> bool:
+    work: AdamsState, t1: float, rhs: Function, project: Function, watch: Function, system: Any,
+    loops: Any,
+) -> bool:  # fmt: skip
     """The rates at the trial state; False where they are not finite, or it lies across a switch."""
     rates = work.scaled[ROWS - 1]
     trial, total, watched = work.state[at.TRIAL], work.state[at.SCRATCH], work.switch_count != 0
@@ -342,7 +345,7 @@ def complete_step(
         if not all_finite(rates):
             work.t_stop, work.status = t1, at.NOT_FINITE
             return False
-    return not (watched and end_is_across(work, t1, rates, watch, system, loops))
+    return not (watched and end_is_across(work, t1, rates, project, watch, system, loops))
 
 
 @compiled
@@ -416,3 +419,80 @@ def reject(work: AdamsState, t1: float, h: float, order: int, factor: float, cau
     work.h = h * factor
     if work.h < step_control.step_floor(work):
         work.t_stop, work.status = t1, cause
+
+
+class AdamsIntegration(Integration):
+    """An initial value problem, integrated by Adams methods of order 1 to 12.
+
+    Parameters
+    ----------
+    args, options
+        As for ``Integration``; steps near singular states are not placed.
+    step
+        Must be None: order and step are chosen together.
+
+    Raises
+    ------
+    ValueError
+        For a fixed step; for times, sizes or tolerances that make no sense.
+    """
+
+    name = "adams"
+    state_class = AdamsState
+    takes_programs = True
+    keeps_step = False
+    loop = staticmethod(advance_adams)
+
+    def __init__(self, *args: Any, step: float | None = None, **options: Any) -> None:
+        if step is not None:
+            raise ValueError(
+                f"adams chooses order and step together and takes no step ({step}); "
+                "leave step out, or take rk4, dopri5 or dop853"
+            )
+        super().__init__(*args, **options)
+        self.work.order = 2  # a first step of order 1
+
+    def own_arrays(self, size: int, length_count: int) -> dict[str, Any]:
+        """As ``Integration.own_arrays``."""
+        return {
+            "differences": np.zeros((ROWS, size)),
+            "scaled": np.zeros((ROWS, size)),
+            "table": make_table(),
+        }
+
+    def state_arrays(self) -> list[Any]:
+        """As ``Integration.state_arrays``; here the table holds the times of past rates."""
+        return [*super().state_arrays(), self.work.table]
+
+    def restored(self, name: str, array: Any, found: Any) -> Any:
+        """As ``Integration.restored``."""
+        if name == "table":
+            return restored(name, array, found, (CONSTANT,))
+        return super().restored(name, array, found)
+
+    def allowed_integers(self, found: Mapping[str, int]) -> dict[str, Container[int]]:
+        """As ``Integration.allowed_integers``."""
+        return super().allowed_integers(found) | {
+            "next_order": range(1 if found["first_stage_valid"] else 0, HIGHEST + 1),
+            "last_order": range(HIGHEST + 1),
+            "is_starting": (0, 1),
+            **dict.fromkeys(("equal_steps", "failure_count"), range(at.MOST_COUNTED)),
+        }
+
+    def state_within(self, t: float) -> Floats | None:
+        """As ``Integration.state_within``."""
+        if self.work.first_stage_valid == 0 or self.work.step_count == 0:
+            return None
+        return self._interpolated(state_at, t)
+
+    @property
+    def dy_dt(self) -> Floats | None:
+        """(n,) dy/dt at ``t``, a copy; None where it is not known."""
+        if self.work.first_stage_valid == 0:
+            return None
+        return self.work.differences[0].copy()
+
+    @property
+    def order(self) -> int:
+        """Order of the next step."""
+        return int(self.work.next_order)

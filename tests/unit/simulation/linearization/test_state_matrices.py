@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 
 import dap3d_core as dap
 from dap3d_core.result import UnknownNameError
+from dap3d_core.simulation.linearization.state_matrices import peaks
 
 M, C = np.diag([2.0, 1.0]), np.array([[1.5, -0.5], [-0.5, 0.5]])
 K = np.array([[300.0, -100.0], [-100.0, 100.0]])
@@ -58,3 +60,21 @@ def test_frequencies_that_are_none_are_refused(wrong):
     lin = dap.linearize(masses(), inputs=["push"], outputs=["b.r.x"])
     with pytest.raises(ValueError, match="0 Hz and more"):
         lin.frequency_response(wrong)
+
+
+def test_a_peak_is_that_between_the_samples():
+    """Of x / y of a mass on a moving base, closed form; 61 samples are 6 dampings wide."""
+    r = np.unique(
+        np.concatenate([np.geomspace(0.1, 10.0, 200), 1.0 + 0.3 * np.linspace(-1, 1, 61)])
+    )
+
+    def gain(r, d=0.2j):
+        return (1.0 + d * r) / (1.0 - r**2 + d * r)
+
+    (peak,) = peaks(r, gain(r))
+    found = minimize_scalar(lambda x: -abs(gain(x)), bounds=(0.9, 1.0), options={"xatol": 1e-12})
+    assert peak.frequency == pytest.approx(found.x, rel=2e-5)
+    assert peak.gain == pytest.approx(-found.fun, rel=1e-6)
+    assert peak.phase == pytest.approx(np.angle(gain(found.x)), rel=2e-4)
+    undamped = np.where(r == 1.0, np.inf, 1.0 / np.where(r == 1.0, 1.0, 1.0 - r**2))
+    assert peaks(r, undamped)[0].frequency == 1.0

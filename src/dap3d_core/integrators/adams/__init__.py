@@ -1,1 +1,0 @@
-"""Adams methods of order 1 to 12."""

@@ -1,1 +1,0 @@
-"""Rank and null space of the constraint Jacobian."""
