@@ -146,7 +146,7 @@ def repeat(
     Args: as of ``decide``.
 
     Returns:
-        False where contacts that share what they carry slide, and other ones would here.
+        False where contacts share what they carry, and others of them would slide or hold here.
     """
     place(t, s.y, system, loops)
     find_grips(t, s, system, tensions)
@@ -162,7 +162,7 @@ def repeat(
     lift(s)
     change(s, system)
     zero(s.moved)
-    are_same = not slide_sharing(s) or share_anew(t, s, system, loops, functions, tensions)
+    are_same = not share(s) or share_anew(t, s, system, loops, functions, tensions)
     for c in range(s.mode.shape[0]):
         size = size_across(s, c, s.slip[c])
         if s.mode[c] == 1.0 and size > STOPPED * s.speed[c]:
@@ -177,8 +177,8 @@ def repeat(
 
 
 @compiled
-def slide_sharing(s: ContactArrays) -> bool:
-    """True if contacts slide that share what they carry: the motion depends on the share."""
+def share(s: ContactArrays) -> bool:
+    """True if contacts share what they carry: motion or instants depend on the share."""
     found = False
     for c in range(s.mode.shape[0]):
         for i in range(3):
@@ -197,11 +197,11 @@ def share_anew(
         if s.mode[c] > 0.5:
             s.in_touch[s.in_touch_count] = c
             s.in_touch_count += 1
-        slips = size_across(s, c, s.slip[c]) > STOPPED * s.length[c]
+        slips = size_across(s, c, s.slip[c]) > STOPPED * s.speed[c]
         for i in range(3):  # of what slides from rest
             s.begin_way[c, i] = 0.0
             for k in range(3):
-                part = s.arm[c] / s.length[c] * s.way[c, k]
+                part = s.arm[c] / s.speed[c] * s.way[c, k]
                 s.begin_way[c, i] += s.frames[c, i, k] * part
             s.slip[c, i] = s.slip[c, i] if slips else 0.0
     move_on(t, s, system, loops, tensions)
