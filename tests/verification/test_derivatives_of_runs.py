@@ -5,6 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 from scipy.special import airy, ellipj, ellipk
+from support import redundant
 from support.bouncing import bouncing
 from support.plain import jit_is_on
 
@@ -126,6 +127,35 @@ def test_by_the_direction_of_an_axis_whose_normals_jump():
         return -0.5 * 9.81 * s.result.t[:, None] ** 2 * a[2] * a / (a @ a)
 
     assert s.of("block.r")[..., 0] == pytest.approx(derivative(place, 0.32), abs=1e-9)
+
+
+def test_radau_takes_over_where_a_strong_damper_makes_it_stiff():
+    """x - l0 decays by the two roots of m s^2 + c s + k."""
+    m, t_end = 2.0, 5.0
+    scene = dap.Scene(name="damped")
+    scene.add_body("mass", mass=m, Jp=(1.0, 1.0, 1.0), r=(1.5, 0.0, 0.0))
+    scene.add_force("ptp", "f", P_i="mass.O", P_j="ground.O", k=400.0, l0=1.0, c=2000.0)
+    settings = TIGHT | {"integrator": "auto", "t_end": t_end, "dt": 1.0}
+    found = dap.sensitivities(scene, ["forces.f.c", "forces.f.k"], **settings)
+    assert any("then radau" in note for note in found.result.notes)
+
+    def place(c, k):
+        a, b = np.roots([m, c, k])
+        return 1.0 + 0.5 * (a * np.exp(b * t_end) - b * np.exp(a * t_end)) / (a - b)
+
+    assert found.final("mass.r.x") == pytest.approx([*by_each(place, (2000.0, 400.0))], rel=1e-8)
+
+
+@pytest.mark.slow
+def test_dop853_takes_radau_across_a_singular_pose():
+    """And leaves it to radau behind: derivatives are those of dop853 alone."""
+    scene, by = redundant.four_bars(1), ["bodies.crank0.mass", "bodies.crank0.w.z"]
+    settings = {"t_end": 2.0, "dt": 0.25, "rtol": 1e-10, "atol": 1e-12}
+    runs = [
+        dap.sensitivities(scene, by, integrator=name, **settings) for name in ("radau", "dop853")
+    ]
+    assert any("radau met a singular pose 2 times" in note for note in runs[0].result.notes)
+    close(*(run.of("crank0.r.x") for run in runs), part=1e-6)
 
 
 @pytest.mark.every(2)

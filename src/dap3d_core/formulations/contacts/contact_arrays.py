@@ -54,6 +54,7 @@ class ContactArrays(Arrays):
     in_touch_count = _integer()
     is_free = _integer()  # 1: ``free`` is of the present velocities
     starts = _integer()  # 1 at the start of a run
+    repeats = _integer()  # 1 where loads are shared by contacts whose modes are known
     jammed = _integer()  # a contact that has been found to jam, or -1
     freed = _integer()  # how often impulses without a collision have ended a jam
     culprit = _integer()  # a contact with which no motion goes on

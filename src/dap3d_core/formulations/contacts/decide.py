@@ -146,7 +146,7 @@ def repeat(
     Args: as of ``decide``.
 
     Returns:
-        False where contacts that share what they carry slide, and other ones would here.
+        False where contacts share what they carry, and others of them would slide or hold here.
     """
     place(t, s.y, system, loops)
     find_grips(t, s, system, tensions)
@@ -162,7 +162,7 @@ def repeat(
     lift(s)
     change(s, system)
     zero(s.moved)
-    are_same = not slide_sharing(s) or share_anew(t, s, system, loops, functions, tensions)
+    are_same = not share(s) or share_anew(t, s, system, loops, functions, tensions)
     for c in range(s.mode.shape[0]):
         size = size_across(s, c, s.slip[c])
         if s.mode[c] == 1.0 and size > STOPPED * s.speed[c]:
@@ -177,12 +177,12 @@ def repeat(
 
 
 @compiled
-def slide_sharing(s: ContactArrays) -> bool:
-    """True if contacts slide that share what they carry: the motion depends on the share."""
+def share(s: ContactArrays) -> bool:
+    """True if contacts share what they carry: motion or instants depend on the share."""
     found = False
     for c in range(s.mode.shape[0]):
         for i in range(3):
-            found |= s.mode[c] == 1.0 and s.near[c, i] != 0.0
+            found |= s.mode[c] > 0.5 and s.near[c, i] != 0.0
     return found
 
 
@@ -193,12 +193,21 @@ def share_anew(
     """Divide what contacts carry at the present velocities; False if other modes are found."""
     s.in_touch_count = 0
     for c in range(s.mode.shape[0]):
-        s.was[c], s.begins[c], s.leaves[c] = s.mode[c], 0, 0
+        s.was[c], s.begins[c], s.leaves[c] = s.mode[c], s.mode[c] == 1.0, 0
         if s.mode[c] > 0.5:
             s.in_touch[s.in_touch_count] = c
             s.in_touch_count += 1
+        slips = size_across(s, c, s.slip[c]) > STOPPED * s.speed[c]
+        for i in range(3):  # of what slides from rest
+            s.begin_way[c, i] = 0.0
+            for k in range(3):
+                part = s.arm[c] / s.speed[c] * s.way[c, k]
+                s.begin_way[c, i] += s.frames[c, i, k] * part
+            s.slip[c, i] = s.slip[c, i] if slips else 0.0
     move_on(t, s, system, loops, tensions)
+    s.repeats = 1
     are_same = find_modes_now(t, s, system, loops, functions)
+    s.repeats = 0
     for c in range(s.mode.shape[0]):
         are_same &= s.mode[c] == s.was[c]
     return are_same

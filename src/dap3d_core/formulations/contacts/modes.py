@@ -110,7 +110,7 @@ def put_modes(s: ContactArrays) -> bool:
         c = s.closed[k] = s.group[k]
         leaves += s.leaves[c]
         begins += s.begins[c]
-    if leaves + begins > 0:
+    if leaves + begins > 0 and s.repeats == 0:
         # of contacts that share, one at the end of its cone may only have to carry less
         if not put_matrix(s, False):
             return False

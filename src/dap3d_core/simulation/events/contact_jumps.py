@@ -149,6 +149,13 @@ class ContactJumps(Jumps):
             self._refuse_endless(integration, [table.names[c] for c in np.nonzero(ended)[0]])
         self._resolve(integration, TOUCHING * table.length, ended)
 
+    def share(self, some: Integers, others: Integers) -> bool:
+        """As of ``Jumps``."""
+        s, switches = self.arrays, self.table.switches
+        one, other = (np.isin(switches, found).any(axis=1) for found in (some, others))
+        feel = s.feels + np.identity(len(switches), dtype=np.int64)
+        return bool(feel[np.ix_(one, other)].any() and s.near.any())
+
     def slips(self, integration: Integration) -> Floats:
         """As of ``Jumps``."""
         slips: Floats = self.table.outputs(integration.t, self._place(integration))[:, PLANE]
@@ -172,7 +179,7 @@ class ContactJumps(Jumps):
         return slides & self.table.holds[:, 1:].all(axis=1)
 
     def repeat_of(self, other: Jumps) -> None:
-        """Decide what another decided at its last instant, at states nearby."""
+        """As of ``Jumps``."""
         assert isinstance(other, ContactJumps)
         s, of = self.arrays, other.arrays
         for name in DECIDED:

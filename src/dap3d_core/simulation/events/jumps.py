@@ -12,7 +12,7 @@ from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.jumps.law import ImpossibleJumpError, Jump, JumpLaw
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
-from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.model.state_layout import velocities_of
 from dap3d_core.result import EventRecord, information
 from dap3d_core.result.file.validate import are_events, is_number
@@ -81,6 +81,10 @@ class Jumps:
 
     def repeat_of(self, other: "Jumps") -> None:
         """Decide what another decided at its last instant, at states nearby."""
+
+    def share(self, some: Integers, others: Integers) -> bool:
+        """True if contacts of some switches share what they carry with those of others."""
+        return False
 
     def slips(self, integration: Integration) -> Floats:
         """(m, 3) slip of each contact, m/s."""

@@ -11,9 +11,10 @@ import numpy as np
 from dap3d_core.formulations.programs.change_over import ChangeOver
 from dap3d_core.integrators import TABLEAUS, Integration, Status, explicit
 from dap3d_core.integrators.stepping.integration_state import CROSSED, Y
-from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.lanes import Differentiation
 from dap3d_core.simulation import SimulationError
+from dap3d_core.simulation.handover import switch_integrator
 from dap3d_core.simulation.run import Run
 from dap3d_core.study.batch.compiled_batch import arrays_of_numbers
 from dap3d_core.study.sensitivities.neighbours import (
@@ -28,11 +29,16 @@ if TYPE_CHECKING:
 
 #: Part of a run by which a state lies before the jump of a switch.
 BEFORE_JUMP = 1e-12
+#: Part of the time after which shares end sooner than can be told; change of a state, over its
+#: largest number, that is none of its motion.
+SOON, NO_JUMP = 1e-7, 1e-10
 #: Derivative of a slip, over the largest one of the state, that is rounding.
 NO_SLIP = 1e-9
 #: At the end of a slip: most that a step is of the time left; part of the way at which the last one
 #: ends, from where slopes are extrapolated; states that are kept; steps that are taken at most.
 PART, NEAREST, KEPT, MOST_STEPS = 0.25, 1e-6, 256, 20_000
+#: Part of the time below which the way is none: its steps would be rounding of it.
+NO_WAY = 1e-9
 
 
 class DifferentiatedRun(Run):
@@ -52,33 +58,42 @@ class DifferentiatedRun(Run):
         self.reported: list[Floats] = []
         self.slopes: list[Floats] = []
         self.instants: dict[float, Floats] = {}
+        # of them, and the switches that crossed there
+        self._latest = -np.inf, np.zeros(len(self.neighbours)), np.zeros(0, dtype=np.int64)
         return self
 
     def begin(self, integration: Integration) -> None:
-        """As of ``RunState``: the integration is differentiated.
-
-        Raises:
-            SimulationError: it is the second one of the run.
-        """
-        if self.integrations:
-            raise SimulationError(
-                "derivatives end where an integrator hands over to another one; take one alone "
-                "(integrator radau, where the scene is stiff)"
-            )
+        """As of ``RunState``: the integration is differentiated."""
+        is_first = not self.integrations
+        if is_first:
+            self._differentiation = Differentiation(1 + self._lanes)
         super().begin(integration)
-        self._differentiation = Differentiation(1 + self._lanes)
         integration.call = self._differentiation.call  # type: ignore[method-assign]
         integration.rows = self._rows  # type: ignore[method-assign]
-        self._seed()
+        if is_first:
+            self._seed()
         integration.compile()
         if integration.takes_programs:
             self.programs = self._programs()
         if self.jumps is not None:
-            law = type(self.jumps)
-            self.jumps.begin = self._jumping(law.begin)  # type: ignore
-            self.jumps.apply = self._jumping(law.apply)  # type: ignore
-            self._ending = EndingSlip(self, self._differentiation)
+            if is_first:
+                law = type(self.jumps)
+                self.jumps.begin = self._jumping(law.begin)  # type: ignore
+                self.jumps.apply = self._jumping(law.apply)  # type: ignore
+                self._ending = EndingSlip(self, self._differentiation)
             integration.advance = partial(self._ending.advance, integration)  # type: ignore
+
+    def observe_present(self) -> None:
+        """As of ``RunState``: one that goes on has the derivatives of the one before."""
+        super().observe_present()
+        if len(self.integrations) > 1:
+            before, work = self.integrations[-2].work, self.present.work
+            for argument in self.present.loop_arguments:
+                self._differentiation.wide(argument)
+            self._differentiation.take()
+            t = work.indices("real")["t"]
+            self._slopes_of(work.state[Y])[:] = self._slopes_of(before.state[Y])
+            self._slopes_of(work.real)[t] = self._slopes_of(before.real)[t]
 
     def _slopes_of(self, array: Floats) -> Floats:
         """(size, p) view of the derivatives of an array of the integration."""
@@ -151,12 +166,17 @@ class DifferentiatedRun(Run):
         def jump(integration: Integration) -> None:
             work, put = integration.work, self._putting()
             given = np.append(work.state[Y], work.t)
+            crossed = np.flatnonzero(work.switches[CROSSED])
             of_time = self._slopes_of(work.real)[work.indices("real")["t"]].copy()
             of_state = self._slopes_of(work.state)[: work.state.shape[1]].copy()
-            if (k := self._ended_slip(of)) >= 0:
-                of_state, of_time = self._to_end_of_slip(work.t), np.zeros_like(of_time)
-            if k >= 0 or (k := self._jumped_switch()) >= 0:
-                rates = self._rates_before(put, given)
+            ended = self._ended_slip(of)
+            begun = self._ending.begun_at_once(work.t) if ended >= 0 else None
+            if begun is not None:
+                of_state, of_time = (slopes[..., : len(self.neighbours)] for slopes in begun)
+            elif (k := ended if ended >= 0 else self._jumped_switch()) >= 0:
+                if ended >= 0:
+                    of_state, of_time = self._to_end_of_slip(work.t), np.zeros_like(of_time)
+                rates = self._rates_before(self, put, given)
                 late = self._slopes_of_jump(k, put, rates, given, np.vstack([of_state, of_time]))
                 of_state, of_time = of_state + np.outer(rates, late), of_time + late
                 put(self)
@@ -178,6 +198,10 @@ class DifferentiatedRun(Run):
             failures: list[SimulationError] = []
             change(of, integration)
             motion = slice(0, -2)  # without the work done and time
+            if self._shares_again(of, crossed, given):
+                later = self._latest[1] - of_time
+                of_state = of_state + np.outer(self._rates_before(self.base, put, given), later)
+                of_time = of_time + later
             slopes = self._derivative(after, given, np.vstack([of_state, of_time]), motion)
             if np.isnan(slopes).any():
                 what = f"there is no derivative of what happens at t = {work.t:.9g} s"
@@ -185,6 +209,7 @@ class DifferentiatedRun(Run):
             if change is type(of).begin:
                 self._refuse_slip_from_rest(slopes)
             self.instants[float(work.t)] = of_time
+            self._latest = work.t, of_time, crossed
             self._ending.forget()
             self._differentiation.take()
             self._slopes_of(work.state)[: work.state.shape[1]] = slopes
@@ -202,6 +227,11 @@ class DifferentiatedRun(Run):
         }
 
         def put(run: Run) -> None:
+            if run.present.implicit != self.present.implicit:
+                if len(run.integrations) == 1:
+                    switch_integrator(run)
+                else:
+                    run.integrations.reverse()
             arrays = dict(arrays_of(run))
             offset, j = self._offset_of(run)
             for name, array in present:
@@ -274,10 +304,26 @@ class DifferentiatedRun(Run):
         what = f"there is no derivative of the instant t = {t:.9g} s"
         return SimulationError(f"{what}: the switch of {name} jumps there")
 
-    def _rates_before(self, put: Callable[[Run], None], given: Floats) -> Floats:
-        """dy/dt just before a switch has jumped; given: state and time."""
-        put(self)
-        evaluator, (y, t) = self.evaluator, (given[:-1], given[-1])
+    def _shares_again(self, of: "Jumps", crossed: Integers, given: Floats) -> bool:
+        """True where contacts share anew, ever sooner, what soon no share holds: all slide then.
+
+        When that is shows in the instants that lead there; the last ones are by rounding of shares.
+
+        Args:
+            of: what happened at an instant.
+            crossed: the switches that did so there.
+            given: the state before, and time.
+        """
+        t, size = given[-1], len(given) - 2 - len(self.evaluator.states)
+        far, most = np.abs(self.present.y - given[:-1])[:size], np.max(np.abs(given[:size]))
+        before, _, others = self._latest
+        is_soon = t - before <= SOON * t and np.all(far <= NO_JUMP * most)
+        return bool(is_soon) and of.share(crossed, others)
+
+    def _rates_before(self, run: Run, put: Callable[[Run], None], given: Floats) -> Floats:
+        """dy/dt just before an instant, of a run that has the state and time given."""
+        put(run)
+        evaluator, (y, t) = run.evaluator, (given[:-1], given[-1])
         back = BEFORE_JUMP * self.present.work.times[-1]
         return evaluator.slope(t - back, y - back * evaluator.slope(t, y))
 
@@ -371,6 +417,11 @@ class EndingSlip:
     def leads_to(self, t: float) -> bool:
         """True if a state before time t is known, from which slip has come."""
         return bool(self._states) and self._states[0][0] < t
+
+    def begun_at_once(self, t: float) -> tuple[Floats, Floats] | None:
+        """Slopes of state and time where the slip began that ends at time t, if it does at once."""
+        begun, _, slopes, of_time = self._states[0]
+        return (slopes, of_time) if t - begun <= NO_WAY * t else None
 
     def slopes(self, t: float) -> tuple[Floats, dict[float, Floats]]:
         """Slopes (n, lanes) of the state at time t, at which slip ends; of rows before, by time.

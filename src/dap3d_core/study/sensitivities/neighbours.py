@@ -313,6 +313,10 @@ def total_derivative(
         total = neighbours.smooth_derivative(lambda run: function(run, x)) if of_model else none
         if step := change_along(x[..., motion], along[..., motion]):
             total = total + differences(lambda e: function(base, x + e * along), step)  # noqa: B023
+        if np.isnan(total).any():  # beside a limit, which moves with both
+            total = neighbours.smooth_derivative(
+                lambda run: function(run, x + neighbours.offset_of(run) * along)  # noqa: B023
+            )
         found.append(total)
     return np.stack(found, axis=-1)
 
