@@ -131,14 +131,14 @@ def pulled(mu=0.3, x=0.0, y=0.0, across=0.0, **coefficients):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("settings", [{}, {"integrator": "radau"}, {"method": "joint"}], ids=str)
-def test_contacts_that_share_a_load_and_begin_to_slide_together(settings):
+@pytest.mark.parametrize("integrator", ["dop853", "radau"])
+def test_contacts_that_share_a_load_and_begin_to_slide_together(integrator):
     """From t0 = mu m g / 5 on, at which no share holds any more, m x'' = 5 (t - t0).
 
     Slip is slow at first, through which radau takes what dop853 began.
     """
     mu, m, t_end = 0.3, 1.0, 0.7
-    settings = {"rtol": 1e-11, "atol": 1e-14, "t_end": t_end, "dt": 0.1} | settings
+    settings = {"rtol": 1e-10, "atol": 1e-13, "t_end": t_end, "dt": 0.1, "integrator": integrator}
     found = dap.sensitivities(pulled(), ["contacts.floor.mu", "bodies.box.mass"], **settings)
     t0 = mu * m * G / 5.0
     x = 5.0 * (t_end - t0) ** 3 / 6.0 / m
@@ -150,14 +150,21 @@ def test_contacts_that_share_a_load_and_begin_to_slide_together(settings):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("more", [{}, {"mu_s": 0.36}], ids=str)
-@pytest.mark.parametrize("settings", [{}, {"method": "joint"}], ids=str)
+@pytest.mark.parametrize(
+    ("settings", "more"),
+    [
+        ({"integrator": "radau"}, {}),  # through slow slip, of which explicit steps take thousands
+        ({}, {"mu_s": 0.36}),
+        ({"method": "joint"}, {"mu_s": 0.36}),
+    ],
+    ids=["slow", "lsq", "joint"],
+)
 def test_a_box_pulled_aside_turns_as_it_begins_to_slide(settings, more):
     """Its corners begin in directions of their own; against differences of runs."""
     given = {"mu": 0.3, "x": 0.05, "y": 0.03, "across": 1.0}
     settings = {"rtol": 1e-10, "atol": 1e-13, "t_end": 0.9, "dt": 0.1} | settings
     names = "box.r.x", "box.r.y", "box.yaw"
-    by = {"mu": "contacts.floor.mu", "x": "points.hook.sPp.x", "across": "forces.across.f.y"}
+    by = {"mu": "contacts.floor.mu", "across": "forces.across.f.y"}
     found = dap.sensitivities(pulled(**given, **more), list(by.values()), **settings)
     for k, key in enumerate(by):
 

@@ -185,7 +185,9 @@ class DifferentiatedRun(Run):
                 put(run)
                 own = run.present.work
                 own.state[Y], own.t = state[:-1], state[-1]
-                jumps = type(of)(run.evaluator)
+                if run not in others:
+                    others[run] = type(of)(run.evaluator)
+                jumps = others[run]
                 jumps.span = of.span
                 jumps.repeat_of(of)
                 try:
@@ -196,6 +198,7 @@ class DifferentiatedRun(Run):
                 return own.state[Y].copy()
 
             failures: list[SimulationError] = []
+            others: dict[Run, Jumps] = {}
             change(of, integration)
             motion = slice(0, -2)  # without the work done and time
             if self._shares_again(of, crossed, given):
