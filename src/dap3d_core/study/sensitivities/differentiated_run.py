@@ -167,19 +167,7 @@ class DifferentiatedRun(Run):
             work, put = integration.work, self._putting()
             given = np.append(work.state[Y], work.t)
             crossed = np.flatnonzero(work.switches[CROSSED])
-            of_time = self._slopes_of(work.real)[work.indices("real")["t"]].copy()
-            of_state = self._slopes_of(work.state)[: work.state.shape[1]].copy()
-            ended = self._ended_slip(of)
-            begun = self._ending.begun_at_once(work.t) if ended >= 0 else None
-            if begun is not None:
-                of_state, of_time = (slopes[..., : len(self.neighbours)] for slopes in begun)
-            elif (k := ended if ended >= 0 else self._jumped_switch()) >= 0:
-                if ended >= 0:
-                    of_state, of_time = self._to_end_of_slip(work.t), np.zeros_like(of_time)
-                rates = self._rates_before(self, put, given)
-                late = self._slopes_of_jump(k, put, rates, given, np.vstack([of_state, of_time]))
-                of_state, of_time = of_state + np.outer(rates, late), of_time + late
-                put(self)
+            of_state, of_time = self._slopes_before(of, put, given)
 
             def after(run: Run, state: Floats) -> Floats:
                 put(run)
@@ -219,6 +207,29 @@ class DifferentiatedRun(Run):
             self._slopes_of(work.real)[work.indices("real")["t"]] = of_time
 
         return jump
+
+    def _slopes_before(
+        self, of: "Jumps", put: Callable[[Run], None], given: Floats
+    ) -> tuple[Floats, Floats]:
+        """(n, p) and (p,) derivatives of the state before a jump and of its time.
+
+        Args: what jumps; as of ``_slopes_of_jump`` otherwise.
+        """
+        work = self.present.work
+        of_time = self._slopes_of(work.real)[work.indices("real")["t"]].copy()
+        of_state = self._slopes_of(work.state)[: work.state.shape[1]].copy()
+        ended = self._ended_slip(of)
+        begun = self._ending.begun_at_once(work.t) if ended >= 0 else None
+        if begun is not None:
+            of_state, of_time = (slopes[..., : len(self.neighbours)] for slopes in begun)
+        elif (k := ended if ended >= 0 else self._jumped_switch()) >= 0:
+            if ended >= 0:
+                of_state, of_time = self._to_end_of_slip(work.t), np.zeros_like(of_time)
+            rates = self._rates_before(self, put, given)
+            late = self._slopes_of_jump(k, put, rates, given, np.vstack([of_state, of_time]))
+            of_state, of_time = of_state + np.outer(rates, late), of_time + late
+            put(self)
+        return of_state, of_time
 
     def _putting(self) -> Callable[[Run], None]:
         """What makes all numbers those of the present, in a run, with its parameter's change."""
