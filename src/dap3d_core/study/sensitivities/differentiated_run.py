@@ -50,6 +50,7 @@ class DifferentiatedRun(Run):
         reported, slopes: (k, width) rows in coordinates of bodies, and (k, width, p) their
             derivatives, in parts.
         instants: time of each located event and jump -> (p,) its derivatives.
+        in_turns: time from which on slip began and ended at once, by rounding; infinite if never.
     """
 
     def carry(self, neighbours: Sequence[Neighbours], base: Run, lanes: int) -> Self:
@@ -58,6 +59,7 @@ class DifferentiatedRun(Run):
         self.reported: list[Floats] = []
         self.slopes: list[Floats] = []
         self.instants: dict[float, Floats] = {}
+        self.in_turns = np.inf
         # of them, and the switches that crossed there
         self._latest = -np.inf, np.zeros(len(self.neighbours)), np.zeros(0, dtype=np.int64)
         return self
@@ -211,16 +213,14 @@ class DifferentiatedRun(Run):
     def _slopes_before(
         self, of: "Jumps", put: Callable[[Run], None], given: Floats
     ) -> tuple[Floats, Floats]:
-        """(n, p) and (p,) derivatives of the state before a jump and of its time.
-
-        Args: what jumps; as of ``_slopes_of_jump`` otherwise.
-        """
+        """(n, p) and (p,) derivatives of the state before a jump and of its time."""
         work = self.present.work
         of_time = self._slopes_of(work.real)[work.indices("real")["t"]].copy()
         of_state = self._slopes_of(work.state)[: work.state.shape[1]].copy()
         ended = self._ended_slip(of)
         begun = self._ending.begun_at_once(work.t) if ended >= 0 else None
         if begun is not None:
+            self.in_turns = min(self.in_turns, float(work.t))
             of_state, of_time = (slopes[..., : len(self.neighbours)] for slopes in begun)
         elif (k := ended if ended >= 0 else self._jumped_switch()) >= 0:
             if ended >= 0:

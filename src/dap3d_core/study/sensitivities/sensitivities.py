@@ -294,6 +294,13 @@ def _notes(
             "corrected: they are those of a start that is brought onto the constraints (switch "
             "correct on for runs that do so)"
         )
+    if (t := min((run.in_turns for run in runs), default=np.inf)) < np.inf:
+        notes.append(
+            f"derivatives: at t = {t:.6g} s contacts that share a load began to slide in turns of "
+            "slip and stick, by rounding; as a rule derivatives are right behind that, but may be "
+            "off by some parts of a hundred: compare with runs of values nearby, or give the "
+            "contacts a larger mu_s"
+        )
     return notes
 
 
