@@ -17,9 +17,16 @@ from dap3d_core.formulations.contacts.forces import (
     solve_forces,
     still_speed,
 )
-from dap3d_core.formulations.contacts.sharing import are_inside, do_share, leave_to_others
+from dap3d_core.formulations.contacts.sharing import (
+    DEPENDENT,
+    WELL,
+    are_inside,
+    do_share,
+    leave_to_others,
+)
 from dap3d_core.kernels.array_types import Integers
 from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.linear.least_squares import factor_least, put_null
 
 #: Part of its cone in which friction of contacts that share stays where they begin to slip: what it
 #: leaves shows which of them do, and where to.
@@ -182,6 +189,52 @@ def begin_near(s: ContactArrays, part: float) -> bool:
 
 
 @compiled
+def slip_alike(s: ContactArrays, begins: bool, part: float) -> None:
+    """Let what was found to slip do so as on feet of one stiffness, if these press all of it.
+
+    Along what no motion of bodies gives normal forces have nothing then: rows that ask for that.
+    begins, part: as of ``begin_to_move``.
+    """
+    count, n = 0, 3 * s.closed_count
+    for k in range(s.closed_count):
+        c = s.closed[k]
+        slips = s.slides[c] != 0 or size_across(s, c, s.rates[3 * k : 3 * k + 3]) > 0.0
+        if slips and s.alone[c] == 0:
+            s.rows[count] = 3 * k
+            count += 1
+    for i in range(count):
+        for k in range(count):
+            s.B[i, k] = s.W[3 * s.closed[s.rows[i] // 3], 3 * s.closed[s.rows[k] // 3]]
+    rank = factor_least(s.B, count, count, DEPENDENT, 0.0, s.w, s.order)
+    if rank == count:
+        return
+    copy(s.inner[:n], s.cone.x)
+    for q in range(count - rank):
+        put_null(s.B, count, rank, s.w, s.order, q, s.x)
+        for i in range(count):
+            for k in range(count):
+                size = s.W[3 * s.closed[s.rows[i] // 3], 3 * s.closed[s.rows[i] // 3]]
+                s.cone.A[s.rows[i], s.rows[k]] += size * s.x[i] * s.x[k]
+    is_found = begin_to_move(s, 1.0, True) and are_pressed(s, count)
+    is_found = is_found or (begin_to_move(s, part, True) and are_pressed(s, count))
+    put_matrix(s, begins)
+    if not is_found:
+        copy(s.cone.x[:n], s.inner)
+        begin_to_move(s, part, False)
+
+
+@compiled
+def are_pressed(s: ContactArrays, count: int) -> bool:
+    """True if contacts of the first ``rows`` slip, with normal forces that are not small."""
+    size, found = largest(s.cone.x[: 3 * s.closed_count]), True
+    for i in range(count):
+        k = s.rows[i]
+        slips = size_across(s, s.closed[k // 3], s.rates[k : k + 3]) > 0.0
+        found &= slips and s.cone.x[k] > WELL * size
+    return found
+
+
+@compiled
 def let_open(s: ContactArrays) -> None:
     """Take from closed contacts those that open where friction of all others holds."""
     before = s.closed_count
@@ -335,6 +388,8 @@ def put_found(s: ContactArrays, begins: bool, inner: bool, loose: bool) -> bool:
     slips = shares and not holds and slip_sharing(s, begins, part)
     if not (holds or slips) and (shares or not begin_to_move(s, part, True)):
         return False
+    if slips:
+        slip_alike(s, begins, part)
     if loose:
         holds = hold_beside_slip(s)
         if not holds and not (put_matrix(s, False) and begin_to_move(s, LOOSE, True)):
