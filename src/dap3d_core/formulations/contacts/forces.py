@@ -257,17 +257,27 @@ def begin_to_move(s: ContactArrays, part: float, anew: bool) -> bool:
     while True:
         for k in range(3 * s.closed_count if anew else 0):
             s.cone.x[k] = 0.0
-        if not solve_forces(s, part, False):
+        if not solve_to_move(s, part):
             return False
-        put_sizes(s, False)
         more = False
         for k in range(s.closed_count):
-            c, a = s.closed[k], s.rates[3 * k : 3 * k + 3]
-            clear_rounding(s, k, max(ZERO * s.sizes[k], CANCELLED * terms_of(s, k)), a)
-            if size_across(s, c, a) > 0.0 and s.slipping[c] == 0:
+            c = s.closed[k]
+            if size_across(s, c, s.rates[3 * k : 3 * k + 3]) > 0.0 and s.slipping[c] == 0:
                 s.slipping[c], more = 1, True
         if not (more and differs):
             return True
+
+
+@compiled
+def solve_to_move(s: ContactArrays, part: float) -> bool:
+    """As ``begin_to_move``, where it is known what is ``slipping``."""
+    if not solve_forces(s, part, False):
+        return False
+    put_sizes(s, False)
+    for k in range(s.closed_count):
+        least = max(ZERO * s.sizes[k], CANCELLED * terms_of(s, k))
+        clear_rounding(s, k, least, s.rates[3 * k : 3 * k + 3])
+    return True
 
 
 @compiled

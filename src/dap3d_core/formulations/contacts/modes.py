@@ -15,6 +15,7 @@ from dap3d_core.formulations.contacts.forces import (
     put_slip_against,
     size_across,
     solve_forces,
+    solve_to_move,
     still_speed,
 )
 from dap3d_core.formulations.contacts.sharing import (
@@ -166,16 +167,20 @@ def close_active(s: ContactArrays, count: int, begins: bool) -> None:
 def slip_sharing(s: ContactArrays, begins: bool, part: float) -> bool:
     """As ``begin_to_move``, of closed contacts that share, where no forces hold them inside.
 
-    Several solutions are as a rule; that is sought which is next to forces that nearly hold, and at
-    first without those that open where friction of all others holds, as of ``hold_inside``.
+    Several solutions are as a rule; that is sought in which all slip as feet of one stiffness, else
+    which is next to forces that nearly hold, and at first without those that open where friction of
+    all others holds, as of ``hold_inside``.
     begins: as of ``put_matrix``.
     """
     before = s.closed_count
+    if begin_near(s, part) and slip_alike(s, begins, part):
+        return True
     for k in range(before):
         s.active[k], s.gone[s.closed[k]] = s.closed[k], 0
     let_open(s)
     lasts = 0 < s.closed_count < before and put_matrix(s, begins) and begin_near(s, part)
     if lasts and put_returning(s, -ZERO * put_sizes(s, True)) == 0:
+        slip_alike(s, begins, part)
         return True
     close_active(s, before, begins)
     return begin_near(s, part) or begin_to_move(s, part, True)
@@ -189,11 +194,12 @@ def begin_near(s: ContactArrays, part: float) -> bool:
 
 
 @compiled
-def slip_alike(s: ContactArrays, begins: bool, part: float) -> None:
+def slip_alike(s: ContactArrays, begins: bool, part: float) -> bool:
     """Let what was found to slip do so as on feet of one stiffness, if these press all of it.
 
-    Along what no motion of bodies gives normal forces have nothing then: rows that ask for that.
-    begins, part: as of ``begin_to_move``.
+    Normal forces have nothing along what no motion of bodies gives then, as rows ask for. False if
+    they do not press, or nothing shares.
+    begins, part: as of ``put_found``.
     """
     count, n = 0, 3 * s.closed_count
     for k in range(s.closed_count):
@@ -207,7 +213,7 @@ def slip_alike(s: ContactArrays, begins: bool, part: float) -> None:
             s.B[i, k] = s.W[3 * s.closed[s.rows[i] // 3], 3 * s.closed[s.rows[k] // 3]]
     rank = factor_least(s.B, count, count, DEPENDENT, 0.0, s.w, s.order)
     if rank == count:
-        return
+        return False
     copy(s.inner[:n], s.cone.x)
     for q in range(count - rank):
         put_null(s.B, count, rank, s.w, s.order, q, s.x)
@@ -215,23 +221,28 @@ def slip_alike(s: ContactArrays, begins: bool, part: float) -> None:
             for k in range(count):
                 size = s.W[3 * s.closed[s.rows[i] // 3], 3 * s.closed[s.rows[i] // 3]]
                 s.cone.A[s.rows[i], s.rows[k]] += size * s.x[i] * s.x[k]
-    is_found = begin_to_move(s, 1.0, True) and are_pressed(s, count)
-    is_found = is_found or (begin_to_move(s, part, True) and are_pressed(s, count))
+    is_found = slip_pressed(s, count, 1.0) or slip_pressed(s, count, part)
     put_matrix(s, begins)
     if not is_found:
         copy(s.cone.x[:n], s.inner)
         begin_to_move(s, part, False)
+    return is_found
 
 
 @compiled
-def are_pressed(s: ContactArrays, count: int) -> bool:
-    """True if contacts of the first ``rows`` slip, with normal forces that are not small."""
-    size, found = largest(s.cone.x[: 3 * s.closed_count]), True
+def slip_pressed(s: ContactArrays, count: int, part: float) -> bool:
+    """True if some of the contacts of the first ``rows`` slip, and all have normal forces."""
+    zero(s.cone.x[: 3 * s.closed_count])
+    for i in range(count):
+        s.slipping[s.closed[s.rows[i] // 3]] = 1
+    if not solve_to_move(s, part):
+        return False
+    size, presses, slips = largest(s.cone.x[: 3 * s.closed_count]), True, False
     for i in range(count):
         k = s.rows[i]
-        slips = size_across(s, s.closed[k // 3], s.rates[k : k + 3]) > 0.0
-        found &= slips and s.cone.x[k] > WELL * size
-    return found
+        slips |= size_across(s, s.closed[k // 3], s.rates[k : k + 3]) > 0.0
+        presses &= s.cone.x[k] > WELL * size
+    return slips and presses
 
 
 @compiled
@@ -388,8 +399,6 @@ def put_found(s: ContactArrays, begins: bool, inner: bool, loose: bool) -> bool:
     slips = shares and not holds and slip_sharing(s, begins, part)
     if not (holds or slips) and (shares or not begin_to_move(s, part, True)):
         return False
-    if slips:
-        slip_alike(s, begins, part)
     if loose:
         holds = hold_beside_slip(s)
         if not holds and not (put_matrix(s, False) and begin_to_move(s, LOOSE, True)):
