@@ -66,16 +66,9 @@ def place_nodes(y: Floats, system: System) -> None:
     sines, cosines = system.tree.half_angles[0], system.tree.half_angles[1]
     for n in range(1, system.tree.nodes.shape[0]):
         t = node.TREE_WIDTH * n
-        o, up, motion = (
-            BODY_WIDTH * tree[t + node.ROW],
-            BODY_WIDTH * tree[t + node.PARENT_ROW],
-            tree[t + node.MOTION],
-        )
-        k, m, c = (
-            node.WORK_WIDTH * n,
-            node.WORK_WIDTH * tree[t + node.PARENT],
-            node.CONSTANT_WIDTH * n,
-        )
+        o, up = BODY_WIDTH * tree[t + node.ROW], BODY_WIDTH * tree[t + node.PARENT_ROW]
+        k, m = node.WORK_WIDTH * n, node.WORK_WIDTH * tree[t + node.PARENT]
+        c, motion = node.CONSTANT_WIDTH * n, tree[t + node.MOTION]
         i, j = tree[t + node.COORDINATE], tree[t + node.RATE]
         if motion == node.REVOLUTE:
             orient(b, o, relative(b, up, turn(C, c, sines[i], cosines[i])))
@@ -162,14 +155,9 @@ def link(b: Floats, up: int, K: Floats, k: int, m: int, C: Floats, c: int) -> No
     arm = times(b, up + A, vector_of(C, c + node.LINK))
     put(K, k + node.LINK_NOW, arm)
     put(K, k + node.POINT, add(vector_of(K, m + node.POINT), arm))
-    put(
-        K, k + node.VELOCITY, add(vector_of(K, m + node.VELOCITY), cross(vector_of(b, up + W), arm))
-    )
-    put(
-        K,
-        k + node.ACCELERATION,
-        add(vector_of(K, m + node.ACCELERATION), times(K, m + node.SPIN, arm)),
-    )
+    carried, bent = cross(vector_of(b, up + W), arm), times(K, m + node.SPIN, arm)
+    put(K, k + node.VELOCITY, add(vector_of(K, m + node.VELOCITY), carried))
+    put(K, k + node.ACCELERATION, add(vector_of(K, m + node.ACCELERATION), bent))
 
 
 @compiled_into

@@ -96,33 +96,10 @@ def reduce_nodes(system: System, forces: Floats, keeps: bool) -> float:
 @compiled_into
 def own_inertia(b: Floats, o: int, C: Floats, c: int) -> Symmetric:
     """Inertia of a body about P, global axes: A J' A^T."""
-    a00, a01, a02 = vector_of(b, o + A)
-    a10, a11, a12 = vector_of(b, o + A + 3)
-    a20, a21, a22 = vector_of(b, o + A + 6)
-    j00, j01, j02, j11, j12, j22 = six_of(C, c + node.INERTIA)
-    x0, x1, x2 = (
-        a00 * j00 + a01 * j01 + a02 * j02,
-        a00 * j01 + a01 * j11 + a02 * j12,
-        a00 * j02 + a01 * j12 + a02 * j22,
-    )
-    y0, y1, y2 = (
-        a10 * j00 + a11 * j01 + a12 * j02,
-        a10 * j01 + a11 * j11 + a12 * j12,
-        a10 * j02 + a11 * j12 + a12 * j22,
-    )
-    z0, z1, z2 = (
-        a20 * j00 + a21 * j01 + a22 * j02,
-        a20 * j01 + a21 * j11 + a22 * j12,
-        a20 * j02 + a21 * j12 + a22 * j22,
-    )
-    return (
-        x0 * a00 + x1 * a01 + x2 * a02,
-        x0 * a10 + x1 * a11 + x2 * a12,
-        x0 * a20 + x1 * a21 + x2 * a22,
-        y0 * a10 + y1 * a11 + y2 * a12,
-        y0 * a20 + y1 * a21 + y2 * a22,
-        z0 * a20 + z1 * a21 + z2 * a22,
-    )
+    J = six_of(C, c + node.INERTIA)
+    one, two, three = vector_of(b, o + A), vector_of(b, o + A + 3), vector_of(b, o + A + 6)
+    x, y, z = symmetric_times(J, one), symmetric_times(J, two), symmetric_times(J, three)
+    return dot(x, one), dot(x, two), dot(x, three), dot(y, two), dot(y, three), dot(z, three)
 
 
 @compiled_into

@@ -20,16 +20,11 @@ def spread_tree(y: Floats, out: Floats, system: System) -> None:
     tree, b, K = pointer(system.tree.nodes), pointer(system.tree.places), pointer(system.tree.work)
     for n in range(1, system.tree.nodes.shape[0]):
         t, k = node.TREE_WIDTH * n, node.WORK_WIDTH * n
-        m, motion, o = (
-            node.WORK_WIDTH * tree[t + node.PARENT],
-            tree[t + node.MOTION],
-            BODY_WIDTH * tree[t + node.ROW],
-        )
-        i, j = tree[t + node.COORDINATE], tree[t + node.RATE]
+        m, o = node.WORK_WIDTH * tree[t + node.PARENT], BODY_WIDTH * tree[t + node.ROW]
+        i, j, motion = tree[t + node.COORDINATE], tree[t + node.RATE], tree[t + node.MOTION]
         alpha = vector_of(K, m + node.ALPHA_Q)
-        a = add(
-            vector_of(K, m + node.ACCELERATION_Q), cross(alpha, vector_of(K, k + node.LINK_NOW))
-        )
+        carried = cross(alpha, vector_of(K, k + node.LINK_NOW))
+        a = add(vector_of(K, m + node.ACCELERATION_Q), carried)
         is_alone = tree[t + node.FLAGS] & node.IS_ALONE != 0
         if motion == node.FREE:
             a = vector_of(K, k + node.FORCE)
