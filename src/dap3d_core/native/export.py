@@ -5,6 +5,7 @@ import re
 import shutil
 import tempfile
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -138,7 +139,9 @@ def model_of(
     prepared = PreparedRun(scene, **options)
     prepared.may_start_anew &= bool(parameters)
     given = outputs_of(prepared, outputs)
-    directions = Directions.of(prepared, given)
+    directions = None
+    with suppress(CompileError):  # a function has no derivative
+        directions = Directions(prepared, given)
     chosen = _parameters(prepared, parameters, options, given)
     variables = variables_of(prepared, given.found, chosen)
     _refuse_shared(variables)

@@ -13,9 +13,6 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import (
-    KNOT,
-    SCRATCH,
-    SWITCH,
     VALUE,
     WRENCH,
     Floats,
@@ -29,7 +26,11 @@ from dap3d_core.assembly.metric import in_body_axes
 from dap3d_core.assembly.turns import has_measured
 from dap3d_core.formulations.common.constraints import linearise, report_levels, report_multipliers
 from dap3d_core.formulations.common.friction import has_friction, solve_with_friction
-from dap3d_core.formulations.common.switching_functions import count, counts_own_angles
+from dap3d_core.formulations.common.switching_functions import (
+    count,
+    counts_own_angles,
+    read_switches,
+)
 from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.formulations.joint.multipliers import joint_multipliers, scale_accelerations
 from dap3d_core.formulations.joint.place import place_tree
@@ -170,10 +171,8 @@ def accepted(t: float, y: Floats, out: Floats, system: System, loops: Any) -> No
 @compiled
 def watch(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Switches at a state into ``out``, as in common/switching_functions.py."""
-    place_of_next = system.settings[SCRATCH : SCRATCH + 1]
     place(t, y, system, loops)
-    place_of_next[0] = 0.0
-    call_kinds(SWITCH, KNOT, t, system, loops, out, place_of_next, place_of_next)
+    read_switches(t, out, system, loops)
 
 
 @compiled

@@ -14,7 +14,7 @@ from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.metric import gyroscopic_moment
 from dap3d_core.assembly.turns import vector_of
 from dap3d_core.formulations.joint import node_layout as node
-from dap3d_core.formulations.joint.place import in_node_axes, put, times
+from dap3d_core.formulations.joint.place import put, times
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A, V, W
@@ -140,18 +140,18 @@ def accelerate_alone(
     Returns the power of its forces, by moments about P: ground has none of it. What only turns is
     taken in the body's axes, where its velocities and moments of inertia are.
     """
-    J = six_of(C, c + node.INERTIA)
+    J, turn = six_of(C, c + node.INERTIA), nine_of(b, o + A)
     if motion >= node.SPHERICAL:
         w = vector_of(K, k + node.OWN_W)
-        moment = cross(vector_of(C, c + node.CENTRE), in_node_axes(b, o, f))
-        moment = add(in_node_axes(b, o, n), moment)
+        moment = cross(vector_of(C, c + node.CENTRE), transposed_times(turn, f))
+        moment = add(transposed_times(turn, n), moment)
         lacking = sub(moment, gyroscopic_moment(J, w))
         put(K, k + node.MOMENT, solve_factored(factors_of(J), lacking))
         put(K, k + node.FORCE, scale(1.0 / C[c + node.MASS], f))
         return dot(moment, w) + dot(f, vector_of(K, k + node.VELOCITY))
     if motion == node.REVOLUTE:
         axis = vector_of(K, k + node.AXIS_NOW)
-        own = in_node_axes(b, o, axis)
+        own = transposed_times(turn, axis)
         lack = dot(axis, add(n, cross(vector_of(K, k + node.CENTRE_NOW), f)))
         K[k + node.FREE_RATE] = lack * (1.0 / dot(own, symmetric_times(J, own)))
     elif motion == node.PRISMATIC:

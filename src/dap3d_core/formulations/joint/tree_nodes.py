@@ -43,11 +43,9 @@ def unsuitable_motion(motions: JointMotions) -> str:
     for kind in kinds:
         if kind not in MOTIONS:
             return f"its motion is a {kind}"
-    return (
-        "its motion is a rotation about a point and more"
-        if BALL in kinds and kinds != [BALL]
-        else ""
-    )
+    if BALL in kinds and kinds != [BALL]:
+        return "its motion is a rotation about a point and more"
+    return ""
 
 
 @attrs.frozen(eq=False)

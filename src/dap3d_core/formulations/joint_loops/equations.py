@@ -12,7 +12,7 @@ The same S moves a state onto the kept rows: those of the tree cannot be violate
 from typing import Any
 
 from dap3d_core.assembly.arrays import SINGULAR, Floats, System
-from dap3d_core.assembly.evaluate import state_rates, zero
+from dap3d_core.assembly.evaluate import copy, state_rates, zero
 from dap3d_core.formulations.common.constraints import (
     power_of_drivers,
     report_levels,
@@ -138,8 +138,7 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
     report_levels(t, y, out, system, loops)
     if system.tree.kept.settings[layout.PART_OF_ROW] > 0.0:
         for _ in range(2):
-            for k in range(system.total.shape[0]):
-                system.total[k] = system.multipliers[k]
+            copy(system.total, system.multipliers)
             minimum_norm_multipliers(system)
         report_multipliers(system, out)
 
