@@ -82,10 +82,8 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
     n = model.body_count
     body = np.zeros((n + 1, BODY_WIDTH))
     body[0, A : A + 9 : 4] = body[0, P] = 1.0
-    body[1:, MASS] = model.mass
-    body[1:, JP : JP + 9] = model.Jp.reshape(n, 9)
     metric = np.zeros((n + 1, METRIC_WIDTH))
-    set_metric(metric, model.mass, model.Jp)
+    _set_masses(body, metric, model)
     idx, par, groups, starts = _tables(model, plan, what)
     turns, counted = turn_tables(model, len(par))
     even, weak = mass_flags(model.mass, moments_of(model.Jp), model.part_size)
@@ -206,37 +204,36 @@ def load_numbers(
     Raises:
         ValueError: the structure is another: elements, bodies, functions or sizes of tables.
     """
-    twins = _twins(model, other)
-    parts, seen, p0 = [], set(), 0
-    for _, group in what:
-        if id(group) not in seen:
-            seen.add(id(group))
-            parts.append(twins[id(group)].packed_numbers(p0))
-            p0 += parts[-1].size
+    groups = regrouped(model, other, what)
+    parts: dict[int, Floats] = {}
+    p0 = 0
+    for _, group in groups:
+        if id(group) not in parts:
+            parts[id(group)] = group.packed_numbers(p0)
+            p0 += parts[id(group)].size
     turns, counted = turn_tables(other, p0)
-    if p0 + counted.size != system.par.size or len(model.mass) != len(other.mass):
+    sizes = p0 + counted.size, len(other.mass)
+    has_same_turns = np.array_equal(turns[:, BODY_I:], system.turns[:, BODY_I:])
+    if sizes != (system.par.size, len(model.mass)) or not has_same_turns:
         raise ValueError("models of different structure")
-    if not np.array_equal(turns[:, BODY_I:], system.turns[:, BODY_I:]):
-        raise ValueError("models of different structure")
-    system.par[:] = np.concatenate([np.zeros(0), *parts, counted])
-    system.body[1:, MASS] = other.mass
-    system.body[1:, JP : JP + 9] = other.Jp.reshape(-1, 9)
-    set_metric(system.metric, other.mass, other.Jp)
+    system.par[:] = np.concatenate([np.zeros(0), *parts.values(), counted])
+    _set_masses(system.body, system.metric, other)
     system.settings[LENGTH] = other.length
     flags = mass_flags(other.mass, moments_of(other.Jp), other.part_size)
     system.settings[[EVEN, WEAK]] = flags
-    return regrouped(model, other, what)
+    return groups
+
+
+def _set_masses(body: Floats, metric: Floats, model: Model) -> None:
+    """Put the masses and inertias of a model into its bodies, and what follows from them."""
+    body[1:, MASS] = model.mass
+    body[1:, JP : JP + 9] = model.Jp.reshape(-1, 9)
+    set_metric(metric, model.mass, model.Jp)
 
 
 def regrouped(model: Model, other: Model, what: list[tuple[str, Group]]) -> list[tuple[str, Group]]:
     """The groups of another model that loops made for a model serve; arguments, errors as above."""
-    twins = _twins(model, other)
-    return [(kind, twins[id(group)]) for kind, group in what]
-
-
-def _twins(model: Model, other: Model) -> dict[int, Group]:
-    """Id of each group of a model -> the corresponding group of another."""
-    found = {}
+    twins = {}
     for mine, theirs in zip(_all_groups(model), _all_groups(other), strict=True):
         same = (
             mine.type_info.type is theirs.type_info.type
@@ -248,8 +245,8 @@ def _twins(model: Model, other: Model) -> dict[int, Group]:
         )
         if not same:
             raise ValueError("models of different structure")
-        found[id(mine)] = theirs
-    return found
+        twins[id(mine)] = theirs
+    return [(kind, twins[id(group)]) for kind, group in what]
 
 
 def _all_groups(model: Model) -> tuple[Group, ...]:

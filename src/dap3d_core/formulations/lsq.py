@@ -22,13 +22,6 @@ import numpy as np
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.evaluate import global_accelerations, largest, put_rates, zero
 from dap3d_core.formulations.common import constraints
-from dap3d_core.formulations.common.constraints import (
-    PART,
-    factorise_regularised,
-    report_levels,
-    report_multipliers,
-    solve_rows,
-)
 from dap3d_core.formulations.common.friction import has_friction
 from dap3d_core.formulations.common.projection import project_onto
 from dap3d_core.formulations.regularised import accelerate
@@ -74,12 +67,12 @@ def null_space_component(system: System, n: Floats, e: float) -> float:
     x, weight, before = system.multipliers, system.weight, np.inf
     for k in range(x.shape[0]):
         system.compliance[k] = e / (weight[k] * weight[k])
-    factorise_regularised(system)
+    constraints.factorise_regularised(system)
     for _ in range(LEAST_SOLVES):
         for k in range(x.shape[0]):
             x[k] = n[k] / (weight[k] * weight[k])
         zero(system.change)
-        solve_rows(system, system.change)
+        constraints.solve_rows(system, system.change)
         change = 0.0
         for q in range(system.hubs.shape[0]):
             for c in range(system.hubs[q, 1], system.hubs[q, 1] + 6):
@@ -103,7 +96,7 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
 @compiled
 def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Move a state onto its constraints; out as in ``project_onto``."""
-    project_onto(t, y, out, system, loops, constraints, PART, True, True)
+    project_onto(t, y, out, system, loops, constraints, constraints.PART, True, True)
 
 
 @compiled
@@ -111,7 +104,7 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
     """v_dot (6 n, global axes), lambda (rows, in the order of the model), energy, residuals."""
     accelerate(t, y, system, loops)
     global_accelerations(system.metric, system.acceleration, out)
-    report_levels(t, y, out, system, loops)
+    constraints.report_levels(t, y, out, system, loops)
     if not has_friction(system):  # else they are those that forces have read
         minimum_norm_multipliers(system)
-    report_multipliers(system, out)
+    constraints.report_multipliers(system, out)

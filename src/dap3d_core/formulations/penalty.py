@@ -22,17 +22,6 @@ from dap3d_core.assembly.evaluate import (
     zero,
 )
 from dap3d_core.formulations.common import constraints
-from dap3d_core.formulations.common.constraints import (
-    PART,
-    factorise_regularised,
-    linearise,
-    power_of_drivers,
-    report_levels,
-    report_multipliers,
-    residuals,
-    solve_rows,
-    velocity_residuals,
-)
 from dap3d_core.formulations.common.friction import solve_with_friction
 from dap3d_core.formulations.common.projection import project_onto
 from dap3d_core.kernels.runtime.cache import compiled
@@ -42,7 +31,7 @@ from dap3d_core.kernels.runtime.cache import compiled
 def solve(system: System) -> None:
     """``acceleration`` and ``multipliers`` from scaled forces, gamma' in ``right_side``."""
     copy(system.multipliers, system.right_side)
-    solve_rows(system, system.acceleration)
+    constraints.solve_rows(system, system.acceleration)
 
 
 @compiled
@@ -51,21 +40,21 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     force, right_side, residual = system.force, system.right_side, system.residual
     settings = system.settings
     place(t, y, system, loops)
-    linearise(t, system, loops)
-    residuals(t, system, loops)
+    constraints.linearise(t, system, loops)
+    constraints.residuals(t, system, loops)
     stiffness, damping = settings[OMEGA] * settings[OMEGA], 2.0 * settings[MU] * settings[OMEGA]
     for k in range(right_side.shape[0]):
         right_side[k] = system.gamma[k] - stiffness * residual[k]
-    velocity_residuals(system)
+    constraints.velocity_residuals(system)
     for k in range(right_side.shape[0]):
         right_side[k] -= damping * residual[k]
         system.compliance[k] = 1.0 / settings[ALPHA]
     zero(force)
     call_kinds(WRENCH, WRENCH, t, system, loops, force, force, force)
     power = scale_forces(system.body, system.metric, force, system.acceleration)
-    factorise_regularised(system)
+    constraints.factorise_regularised(system)
     power += solve_with_friction(t, system, loops, solve)
-    return power + power_of_drivers(system)
+    return power + constraints.power_of_drivers(system)
 
 
 @compiled
@@ -77,7 +66,7 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
 @compiled
 def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Move a state onto its constraints; out as in ``project_onto``."""
-    project_onto(t, y, out, system, loops, constraints, PART, True, False)
+    project_onto(t, y, out, system, loops, constraints, constraints.PART, True, False)
 
 
 @compiled
@@ -85,5 +74,5 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
     """v_dot (6 n, global axes), lambda (rows, in the order of the model), energy, residuals."""
     accelerate(t, y, system, loops)
     global_accelerations(system.metric, system.acceleration, out)
-    report_multipliers(system, out)
-    report_levels(t, y, out, system, loops)
+    constraints.report_multipliers(system, out)
+    constraints.report_levels(t, y, out, system, loops)

@@ -14,15 +14,6 @@ from dap3d_core.assembly.arrays import EVEN, LENGTH, SINGULAR, Floats, System
 from dap3d_core.assembly.evaluate import copy, global_accelerations, rates, state_rates
 from dap3d_core.formulations import regularised
 from dap3d_core.formulations.common import constraints
-from dap3d_core.formulations.common.constraints import (
-    acceleration_residual,
-    correct,
-    power_of_drivers,
-    report_levels,
-    report_multipliers,
-    solve_equations,
-    solve_rows,
-)
 from dap3d_core.formulations.common.projection import project_onto
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.scalar_math import where
@@ -36,7 +27,7 @@ ROUGH = 1e-12
 def solve(system: System) -> None:
     """``acceleration`` and ``multipliers`` from the scaled forces in ``acceleration``."""
     copy(system.multipliers, system.gamma)
-    solve_rows(system, system.acceleration)
+    constraints.solve_rows(system, system.acceleration)
 
 
 @compiled_into
@@ -45,11 +36,11 @@ def settle_rows(system: System) -> float:
 
     ``multipliers`` becomes the change of -lambda, of which the power of drivers is returned.
     """
-    acceleration_residual(system)
-    correct(system)
+    constraints.acceleration_residual(system)
+    constraints.correct(system)
     for k in range(system.change.shape[0]):
         system.acceleration[k] += system.change[k]
-    return power_of_drivers(system)
+    return constraints.power_of_drivers(system)
 
 
 @compiled_into
@@ -64,7 +55,7 @@ def refine(system: System, out: Floats) -> None:
     for k in range(6 * n):
         part = abs(out[k]) * (1.0 if k % 6 < 3 else length)
         size = where(part > size, part, size)
-    if not acceleration_residual(system) > ROUGH * size:
+    if not constraints.acceleration_residual(system) > ROUGH * size:
         return
     settle_rows(system)
     for k in range(system.row.shape[0]):
@@ -79,7 +70,7 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     Where masses differ much, a light body between heavy ones has reactions whose last digits are
     no rounding of its acceleration any more, but noise that no step can follow.
     """
-    power = solve_equations(t, y, system, loops, None, solve)
+    power = constraints.solve_equations(t, y, system, loops, None, solve)
     state_rates(t, out, system, loops)
     if system.settings[EVEN] != 0.0:
         power += settle_rows(system)
@@ -97,9 +88,9 @@ def report_accelerations(t: float, y: Floats, out: Floats, system: System, loops
         regularised.accelerate(t, y, system, loops)
         system.settings[SINGULAR] += 1.0
     global_accelerations(system.metric, system.acceleration, out)
-    report_multipliers(system, out)
+    constraints.report_multipliers(system, out)
     refine(system, out)
-    report_levels(t, y, out, system, loops)
+    constraints.report_levels(t, y, out, system, loops)
 
 
 @compiled
@@ -111,5 +102,5 @@ def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> Non
 @compiled
 def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """v_dot (6 n, global axes), lambda (rows, in the order of the model), energy, residuals."""
-    solve_equations(t, y, system, loops, None, solve)
+    constraints.solve_equations(t, y, system, loops, None, solve)
     report_accelerations(t, y, out, system, loops)

@@ -55,7 +55,7 @@ class WideRates:
         evaluator: Any,
         size: int,
         count: int,
-        names: Collection[str],
+        names: Collection[str] | None,
         functions: Mapping[int, Entry],
         loops: Sequence[Entry],
     ) -> None:
@@ -63,14 +63,14 @@ class WideRates:
         evaluator: of the scene.
         size: of its state.
         count: sets of numbers.
-        names: arrays of the system that each set has for itself.
+        names: arrays of the system that each set has for itself; None: all.
         functions: right-hand side and, where there are some, projection and switches, of
             ``SIGNATURE``, by their indices.
         loops: the group loops that they call.
         """
         rates = Rates.of(0.0, np.zeros(size), evaluator)
         self._system = WideArrays(evaluator.system, count, names)
-        wide = WideArrays(rates, count, tuple(name for name, _ in rates.walk()))
+        wide = WideArrays(rates, count, None)
         self.lanes = {name: wide.matrix(array) for name, array in rates.walk()}
         self.units = [entry.unit for entry in functions.values()]
         self.has = np.array([int(k in functions) for k in ORDER], dtype=np.int64)

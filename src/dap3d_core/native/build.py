@@ -57,27 +57,21 @@ class Platform:
         return self.name == own_platform()
 
 
-def _platform(
-    name: str, triple: str, cpu: str, zig: str, library: str, fmi2: str, fmi3: str
-) -> Platform:
-    return Platform(name, Processor(triple, cpu, ""), zig, library, fmi2, fmi3)
-
-
 #: Oldest C library of Linux that libraries need.
 _GLIBC = "2.17"
 PLATFORMS = {
     one.name: one
     for one in (
-        _platform("linux-x86-64", "x86_64-unknown-linux-gnu", "x86-64",
-                  f"x86_64-linux-gnu.{_GLIBC}", ".so", "linux64", "x86_64-linux"),
-        _platform("linux-arm64", "aarch64-unknown-linux-gnu", "generic",
-                  f"aarch64-linux-gnu.{_GLIBC}", ".so", "aarch64-linux", "aarch64-linux"),
-        _platform("windows-x86-64", "x86_64-pc-windows-gnu", "x86-64",
-                  "x86_64-windows-gnu", ".dll", "win64", "x86_64-windows"),
-        _platform("macos-x86-64", "x86_64-apple-macosx11.0.0", "x86-64",
-                  "x86_64-macos.11.0", ".dylib", "darwin64", "x86_64-darwin"),
-        _platform("macos-arm64", "arm64-apple-macosx11.0.0", "generic",
-                  "aarch64-macos.11.0", ".dylib", "aarch64-darwin", "aarch64-darwin"),
+        Platform("linux-x86-64", Processor("x86_64-unknown-linux-gnu", "x86-64", ""),
+                 f"x86_64-linux-gnu.{_GLIBC}", ".so", "linux64", "x86_64-linux"),
+        Platform("linux-arm64", Processor("aarch64-unknown-linux-gnu", "generic", ""),
+                 f"aarch64-linux-gnu.{_GLIBC}", ".so", "aarch64-linux", "aarch64-linux"),
+        Platform("windows-x86-64", Processor("x86_64-pc-windows-gnu", "x86-64", ""),
+                 "x86_64-windows-gnu", ".dll", "win64", "x86_64-windows"),
+        Platform("macos-x86-64", Processor("x86_64-apple-macosx11.0.0", "x86-64", ""),
+                 "x86_64-macos.11.0", ".dylib", "darwin64", "x86_64-darwin"),
+        Platform("macos-arm64", Processor("arm64-apple-macosx11.0.0", "generic", ""),
+                 "aarch64-macos.11.0", ".dylib", "aarch64-darwin", "aarch64-darwin"),
     )
 }  # fmt: skip
 #: What a system alone stands for.

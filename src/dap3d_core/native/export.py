@@ -5,6 +5,7 @@ import re
 import shutil
 import tempfile
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -28,7 +29,7 @@ from dap3d_core.native.run.prepared import PreparedRun, refusal
 from dap3d_core.registry import Registry
 from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.extensions import extensions
-from dap3d_core.registry.suggestions import nearest
+from dap3d_core.registry.suggestions import did_you_mean
 from dap3d_core.scene import Scene, SceneError, load
 from dap3d_core.settings import StepSettings
 from dap3d_core.study.parameters import SceneParameter, parameters_named
@@ -138,7 +139,9 @@ def model_of(
     prepared = PreparedRun(scene, **options)
     prepared.may_start_anew &= bool(parameters)
     given = outputs_of(prepared, outputs)
-    directions = Directions.of(prepared, given)
+    directions = None
+    with suppress(CompileError):  # a function has no derivative
+        directions = Directions(prepared, given)
     chosen = _parameters(prepared, parameters, options, given)
     variables = variables_of(prepared, given.found, chosen)
     _refuse_shared(variables)
@@ -390,7 +393,5 @@ def _require_format(kind: str, given: Iterable[str]) -> None:
             return False
 
     formats = sorted([*NATIVE_FORMATS, *filter(is_of_models, exporters.keywords)])
-    near = nearest(kind, formats)
-    hint = f"; did you mean {near!r}?" if near else ""
-    listed = ", ".join(formats)
+    hint, listed = did_you_mean(kind, formats, "; {}"), ", ".join(formats)
     raise PluginError(f"there is no format {kind!r} of models{hint} (there are: {listed})")

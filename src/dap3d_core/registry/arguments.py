@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType, NoneType, UnionType
 from typing import Any, TypeVar, Union, Unpack, get_args, get_origin, get_type_hints
 
-from dap3d_core.registry.suggestions import nearest
+from dap3d_core.registry.suggestions import did_you_mean
 from dap3d_core.settings import RunSettings
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -98,10 +98,9 @@ def _refuse_unknown(
 ) -> None:
     """Refuse an argument that there is none of, as Python words it: with the nearest, or all."""
     for name in given.keys() - signature.parameters.keys():
-        near = nearest(name, signature.parameters)
         words = f"{function.__name__}() got an unexpected keyword argument {name!r}"
         known = f"it takes {', '.join(signature.parameters)}"
-        raise TypeError(f"{words}; {f'did you mean {near!r}?' if near else known}")
+        raise TypeError(f"{words}; {did_you_mean(name, signature.parameters, otherwise=known)}")
 
 
 def require(name: str, kind: Any, value: Any) -> None:

@@ -22,7 +22,7 @@ from dap3d_core.interface.types import INTERFACE_VERSION, TypeBase
 from dap3d_core.registry.discovery import Source
 from dap3d_core.registry.guard import guard, within
 from dap3d_core.registry.regular_files import read_regular
-from dap3d_core.registry.suggestions import did_you_mean, nearest
+from dap3d_core.registry.suggestions import did_you_mean
 
 #: What modules of packages bring: the same in all registries of a process.
 _loaded: dict[tuple[Source, ModuleType], TypeInfo] = {}
@@ -199,10 +199,10 @@ def _with_keyword(source: Source, types: list[type[TypeBase]]) -> type[TypeBase]
         names = " and ".join(t.__name__ for t in matching)
         raise PluginError(f"its classes {names} have the same keyword {source.keyword!r}")
     words = [t.keyword for t in types]
-    near = nearest(source.keyword, words)
+    known = f"its keywords: {', '.join(words) or '-'}"
     raise PluginError(
-        f"it has no class with the keyword {source.keyword!r} that its entry point names"
-        + (f"; did you mean {near!r}?" if near else f"; its keywords: {', '.join(words) or '-'}")
+        f"it has no class with the keyword {source.keyword!r} that its entry point names; "
+        f"{did_you_mean(source.keyword, words, otherwise=known)}"
     )
 
 

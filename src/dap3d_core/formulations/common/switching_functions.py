@@ -50,8 +50,17 @@ def counts_own_angles(system: System) -> bool:
 
 @compiled
 def watch(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
-    """Switches at a state into ``out``, by groups and instances; then distances from knots."""
-    place_of_next = system.settings[SCRATCH : SCRATCH + 1]
+    """Switches at a state into ``out``."""
     place(t, y, system, loops)
+    read_switches(t, out, system, loops)
+
+
+@compiled_into
+def read_switches(t: float, out: Floats, system: System, loops: Any) -> None:
+    """Switches at the bodies as placed, by groups and instances; then distances from knots.
+
+    Closed contacts read ``multipliers``.
+    """
+    place_of_next = system.settings[SCRATCH : SCRATCH + 1]
     place_of_next[0] = 0.0
-    call_kinds(SWITCH, KNOT, t, system, loops, out, place_of_next, place_of_next)
+    call_kinds(SWITCH, KNOT, t, system, loops, out, place_of_next, system.multipliers)

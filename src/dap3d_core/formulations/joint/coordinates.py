@@ -377,10 +377,8 @@ def _joints(tree: SpanningForest, model: Model, plan: Plan) -> Integers:
             row, slots, blocks = [0] * node.JOINT_WIDTH, model.joint_slots[k], plan.joint_block[k]
             row[node.CHILD_BLOCK], row[node.CHILD] = blocks[slots.index(child)], 6 * child
             if parent:
-                row[node.PARENT_BLOCK], row[node.JOINT_PARENT] = (
-                    blocks[slots.index(parent)],
-                    6 * parent,
-                )
+                row[node.PARENT_BLOCK] = blocks[slots.index(parent)]
+                row[node.JOINT_PARENT] = 6 * parent
             row[node.ROW_COUNT], row[node.FIRST_ROW] = model.joint_rows[k], plan.joint_row[k]
             rows.append(row)
     return np.array(rows, dtype=np.int64).reshape(-1, node.JOINT_WIDTH)

@@ -13,9 +13,6 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import (
-    KNOT,
-    SCRATCH,
-    SWITCH,
     VALUE,
     WRENCH,
     Floats,
@@ -29,13 +26,17 @@ from dap3d_core.assembly.metric import in_body_axes
 from dap3d_core.assembly.turns import has_measured
 from dap3d_core.formulations.common.constraints import linearise, report_levels, report_multipliers
 from dap3d_core.formulations.common.friction import has_friction, solve_with_friction
-from dap3d_core.formulations.common.switching_functions import count, counts_own_angles
+from dap3d_core.formulations.common.switching_functions import (
+    count,
+    counts_own_angles,
+    read_switches,
+)
 from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.formulations.joint.multipliers import joint_multipliers, scale_accelerations
 from dap3d_core.formulations.joint.place import place_tree
 from dap3d_core.formulations.joint.reduce import reduce_tree
 from dap3d_core.formulations.joint.spread import body_accelerations, spread_tree
-from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 
 @compiled
@@ -49,6 +50,13 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     spread_tree(y, out, system)
     state_rates(t, out, system, loops)
     out[out.shape[0] - 1] = power
+
+
+@compiled_into
+def place(t: float, y: Floats, system: System, loops: Any) -> None:
+    """Place the nodes of a state, and evaluate functions of time."""
+    place_tree(y, system)
+    call_kinds(VALUE, VALUE, t, system, loops, system.force, system.force, system.force)
 
 
 @compiled
@@ -153,22 +161,18 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
 @compiled
 def accepted(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """As in common/switching_functions.py; angles of the tree are brought within two turns."""
-    has_own = counts_own_angles(system)
-    if has_own or not has_measured(t, system):
+    if counts_own_angles(system):
+        place(t, y, system, loops)
+    elif not has_measured(t, system):
         place_tree(y, system)
-        if has_own:
-            call_kinds(VALUE, VALUE, t, system, loops, system.force, system.force, system.force)
     count(t, y, y[:0], out, system, loops)
 
 
 @compiled
 def watch(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Switches at a state into ``out``, as in common/switching_functions.py."""
-    place_of_next = system.settings[SCRATCH : SCRATCH + 1]
-    place_tree(y, system)
-    call_kinds(VALUE, VALUE, t, system, loops, system.force, system.force, system.force)
-    place_of_next[0] = 0.0
-    call_kinds(SWITCH, KNOT, t, system, loops, out, place_of_next, place_of_next)
+    place(t, y, system, loops)
+    read_switches(t, out, system, loops)
 
 
 @compiled

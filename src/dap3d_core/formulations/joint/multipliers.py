@@ -38,12 +38,8 @@ def joint_multipliers(system: System, left: Floats) -> None:
     work, rest = system.tree.scratch, system.tree.scratch[42:]
     for q in range(system.tree.joints.shape[0]):
         j = node.JOINT_WIDTH * q
-        rows, first, child = (
-            joints[j + node.ROW_COUNT],
-            joints[j + node.FIRST_ROW],
-            joints[j + node.CHILD],
-        )
-        block = joints[j + node.CHILD_BLOCK]
+        rows, first = joints[j + node.ROW_COUNT], joints[j + node.FIRST_ROW]
+        child, block = joints[j + node.CHILD], joints[j + node.CHILD_BLOCK]
         factor_products(D, block, rows, work)
         for c in range(6):
             rest[c] = left[child + c]

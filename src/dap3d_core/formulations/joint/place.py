@@ -15,7 +15,7 @@ from dap3d_core.formulations.joint.half_angles import half_angles
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A, P, R, V, W
-from dap3d_core.kernels.vectors import add, cross, scale
+from dap3d_core.kernels.vectors import add, cross, dot, scale
 
 Vector = Any
 
@@ -29,22 +29,7 @@ def put(x: Floats, k: int, a: Vector) -> None:
 @compiled_into
 def times(x: Floats, k: int, a: Vector) -> Vector:
     """The 3x3 matrix at k, by rows, times a 3-vector."""
-    return (
-        x[k] * a[0] + x[k + 1] * a[1] + x[k + 2] * a[2],
-        x[k + 3] * a[0] + x[k + 4] * a[1] + x[k + 5] * a[2],
-        x[k + 6] * a[0] + x[k + 7] * a[1] + x[k + 8] * a[2],
-    )
-
-
-@compiled_into
-def in_node_axes(b: Floats, o: int, a: Vector) -> Vector:
-    """A^T a of the node whose place is at o."""
-    k = o + A
-    return (
-        b[k] * a[0] + b[k + 3] * a[1] + b[k + 6] * a[2],
-        b[k + 1] * a[0] + b[k + 4] * a[1] + b[k + 7] * a[2],
-        b[k + 2] * a[0] + b[k + 5] * a[1] + b[k + 8] * a[2],
-    )
+    return dot(vector_of(x, k), a), dot(vector_of(x, k + 3), a), dot(vector_of(x, k + 6), a)
 
 
 @compiled
@@ -66,16 +51,9 @@ def place_nodes(y: Floats, system: System) -> None:
     sines, cosines = system.tree.half_angles[0], system.tree.half_angles[1]
     for n in range(1, system.tree.nodes.shape[0]):
         t = node.TREE_WIDTH * n
-        o, up, motion = (
-            BODY_WIDTH * tree[t + node.ROW],
-            BODY_WIDTH * tree[t + node.PARENT_ROW],
-            tree[t + node.MOTION],
-        )
-        k, m, c = (
-            node.WORK_WIDTH * n,
-            node.WORK_WIDTH * tree[t + node.PARENT],
-            node.CONSTANT_WIDTH * n,
-        )
+        o, up = BODY_WIDTH * tree[t + node.ROW], BODY_WIDTH * tree[t + node.PARENT_ROW]
+        k, m = node.WORK_WIDTH * n, node.WORK_WIDTH * tree[t + node.PARENT]
+        c, motion = node.CONSTANT_WIDTH * n, tree[t + node.MOTION]
         i, j = tree[t + node.COORDINATE], tree[t + node.RATE]
         if motion == node.REVOLUTE:
             orient(b, o, relative(b, up, turn(C, c, sines[i], cosines[i])))
@@ -162,14 +140,9 @@ def link(b: Floats, up: int, K: Floats, k: int, m: int, C: Floats, c: int) -> No
     arm = times(b, up + A, vector_of(C, c + node.LINK))
     put(K, k + node.LINK_NOW, arm)
     put(K, k + node.POINT, add(vector_of(K, m + node.POINT), arm))
-    put(
-        K, k + node.VELOCITY, add(vector_of(K, m + node.VELOCITY), cross(vector_of(b, up + W), arm))
-    )
-    put(
-        K,
-        k + node.ACCELERATION,
-        add(vector_of(K, m + node.ACCELERATION), times(K, m + node.SPIN, arm)),
-    )
+    carried, bent = cross(vector_of(b, up + W), arm), times(K, m + node.SPIN, arm)
+    put(K, k + node.VELOCITY, add(vector_of(K, m + node.VELOCITY), carried))
+    put(K, k + node.ACCELERATION, add(vector_of(K, m + node.ACCELERATION), bent))
 
 
 @compiled_into

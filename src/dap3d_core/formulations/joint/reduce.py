@@ -14,7 +14,7 @@ from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.metric import gyroscopic_moment
 from dap3d_core.assembly.turns import vector_of
 from dap3d_core.formulations.joint import node_layout as node
-from dap3d_core.formulations.joint.place import in_node_axes, put, times
+from dap3d_core.formulations.joint.place import put, times
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A, V, W
@@ -96,33 +96,10 @@ def reduce_nodes(system: System, forces: Floats, keeps: bool) -> float:
 @compiled_into
 def own_inertia(b: Floats, o: int, C: Floats, c: int) -> Symmetric:
     """Inertia of a body about P, global axes: A J' A^T."""
-    a00, a01, a02 = vector_of(b, o + A)
-    a10, a11, a12 = vector_of(b, o + A + 3)
-    a20, a21, a22 = vector_of(b, o + A + 6)
-    j00, j01, j02, j11, j12, j22 = six_of(C, c + node.INERTIA)
-    x0, x1, x2 = (
-        a00 * j00 + a01 * j01 + a02 * j02,
-        a00 * j01 + a01 * j11 + a02 * j12,
-        a00 * j02 + a01 * j12 + a02 * j22,
-    )
-    y0, y1, y2 = (
-        a10 * j00 + a11 * j01 + a12 * j02,
-        a10 * j01 + a11 * j11 + a12 * j12,
-        a10 * j02 + a11 * j12 + a12 * j22,
-    )
-    z0, z1, z2 = (
-        a20 * j00 + a21 * j01 + a22 * j02,
-        a20 * j01 + a21 * j11 + a22 * j12,
-        a20 * j02 + a21 * j12 + a22 * j22,
-    )
-    return (
-        x0 * a00 + x1 * a01 + x2 * a02,
-        x0 * a10 + x1 * a11 + x2 * a12,
-        x0 * a20 + x1 * a21 + x2 * a22,
-        y0 * a10 + y1 * a11 + y2 * a12,
-        y0 * a20 + y1 * a21 + y2 * a22,
-        z0 * a20 + z1 * a21 + z2 * a22,
-    )
+    J = six_of(C, c + node.INERTIA)
+    one, two, three = vector_of(b, o + A), vector_of(b, o + A + 3), vector_of(b, o + A + 6)
+    x, y, z = symmetric_times(J, one), symmetric_times(J, two), symmetric_times(J, three)
+    return dot(x, one), dot(x, two), dot(x, three), dot(y, two), dot(y, three), dot(z, three)
 
 
 @compiled_into
@@ -163,18 +140,18 @@ def accelerate_alone(
     Returns the power of its forces, by moments about P: ground has none of it. What only turns is
     taken in the body's axes, where its velocities and moments of inertia are.
     """
-    J = six_of(C, c + node.INERTIA)
+    J, turn = six_of(C, c + node.INERTIA), nine_of(b, o + A)
     if motion >= node.SPHERICAL:
         w = vector_of(K, k + node.OWN_W)
-        moment = cross(vector_of(C, c + node.CENTRE), in_node_axes(b, o, f))
-        moment = add(in_node_axes(b, o, n), moment)
+        moment = cross(vector_of(C, c + node.CENTRE), transposed_times(turn, f))
+        moment = add(transposed_times(turn, n), moment)
         lacking = sub(moment, gyroscopic_moment(J, w))
         put(K, k + node.MOMENT, solve_factored(factors_of(J), lacking))
         put(K, k + node.FORCE, scale(1.0 / C[c + node.MASS], f))
         return dot(moment, w) + dot(f, vector_of(K, k + node.VELOCITY))
     if motion == node.REVOLUTE:
         axis = vector_of(K, k + node.AXIS_NOW)
-        own = in_node_axes(b, o, axis)
+        own = transposed_times(turn, axis)
         lack = dot(axis, add(n, cross(vector_of(K, k + node.CENTRE_NOW), f)))
         K[k + node.FREE_RATE] = lack * (1.0 / dot(own, symmetric_times(J, own)))
     elif motion == node.PRISMATIC:

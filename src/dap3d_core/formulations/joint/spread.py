@@ -6,8 +6,14 @@ Featherstone, Rigid Body Dynamics Algorithms (2008), 7.3.
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.turns import vector_of
 from dap3d_core.formulations.joint import node_layout as node
-from dap3d_core.formulations.joint.place import Vector, in_node_axes, put, times
-from dap3d_core.formulations.joint.reduce import factors_of, six_of, solve_factored
+from dap3d_core.formulations.joint.place import Vector, put, times
+from dap3d_core.formulations.joint.reduce import (
+    factors_of,
+    nine_of,
+    six_of,
+    solve_factored,
+    transposed_times,
+)
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A
@@ -20,16 +26,11 @@ def spread_tree(y: Floats, out: Floats, system: System) -> None:
     tree, b, K = pointer(system.tree.nodes), pointer(system.tree.places), pointer(system.tree.work)
     for n in range(1, system.tree.nodes.shape[0]):
         t, k = node.TREE_WIDTH * n, node.WORK_WIDTH * n
-        m, motion, o = (
-            node.WORK_WIDTH * tree[t + node.PARENT],
-            tree[t + node.MOTION],
-            BODY_WIDTH * tree[t + node.ROW],
-        )
-        i, j = tree[t + node.COORDINATE], tree[t + node.RATE]
+        m, o = node.WORK_WIDTH * tree[t + node.PARENT], BODY_WIDTH * tree[t + node.ROW]
+        i, j, motion = tree[t + node.COORDINATE], tree[t + node.RATE], tree[t + node.MOTION]
         alpha = vector_of(K, m + node.ALPHA_Q)
-        a = add(
-            vector_of(K, m + node.ACCELERATION_Q), cross(alpha, vector_of(K, k + node.LINK_NOW))
-        )
+        carried = cross(alpha, vector_of(K, k + node.LINK_NOW))
+        a = add(vector_of(K, m + node.ACCELERATION_Q), carried)
         is_alone = tree[t + node.FLAGS] & node.IS_ALONE != 0
         if motion == node.FREE:
             a = vector_of(K, k + node.FORCE)
@@ -44,7 +45,7 @@ def spread_tree(y: Floats, out: Floats, system: System) -> None:
                 alpha = times(b, o + A, own)
             else:
                 alpha = sub(vector_of(K, k + node.MOMENT), times(K, k + node.MATRIX_H, a))
-                own = in_node_axes(b, o, alpha)
+                own = transposed_times(nine_of(b, o + A), alpha)
             turn_parameters(y, i, vector_of(y, j), out)
             put(out, j, own)
         elif motion != node.FIXED:

@@ -43,11 +43,9 @@ def unsuitable_motion(motions: JointMotions) -> str:
     for kind in kinds:
         if kind not in MOTIONS:
             return f"its motion is a {kind}"
-    return (
-        "its motion is a rotation about a point and more"
-        if BALL in kinds and kinds != [BALL]
-        else ""
-    )
+    if BALL in kinds and kinds != [BALL]:
+        return "its motion is a rotation about a point and more"
+    return ""
 
 
 @attrs.frozen(eq=False)
@@ -149,11 +147,8 @@ def _table(motion: Integers, parent: Integers, body: Integers, body_count: int) 
     table = np.zeros((count, node.TREE_WIDTH), dtype=np.int64)
     massless = body < 0
     table[:, node.ROW] = np.where(massless, body_count + np.cumsum(massless), body)
-    table[:, node.PARENT], table[:, node.PARENT_ROW], table[:, node.MOTION] = (
-        parent,
-        table[parent, node.ROW],
-        motion,
-    )
+    table[:, node.PARENT], table[:, node.MOTION] = parent, motion
+    table[:, node.PARENT_ROW] = table[parent, node.ROW]
     last_child = np.zeros(count, dtype=np.int64)
     np.maximum.at(last_child, parent[1:], np.arange(1, count))
     table[:, node.FLAGS] = node.HAS_MASS * (body > 0) + node.HAS_CHILDREN * (last_child > 0)

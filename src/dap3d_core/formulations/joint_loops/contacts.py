@@ -14,14 +14,11 @@ forces, and all else is as without contacts.
 
 from typing import Any
 
-from dap3d_core.assembly.arrays import KNOT, SCRATCH, SWITCH, Floats, System
-from dap3d_core.assembly.evaluate import call_kinds, scale_forces, state_rates, zero
-from dap3d_core.formulations.common.constraints import (
-    power_of_drivers,
-    report_levels,
-    report_multipliers,
-)
+from dap3d_core.assembly.arrays import Floats, System
+from dap3d_core.assembly.evaluate import copy, scale_forces, state_rates, zero
+from dap3d_core.formulations.common.constraints import report_levels, report_multipliers
 from dap3d_core.formulations.common.projection import project_onto
+from dap3d_core.formulations.common.switching_functions import read_switches
 from dap3d_core.formulations.contacts.equations import (
     BODY_I,
     BODY_J,
@@ -45,16 +42,12 @@ from dap3d_core.formulations.joint.reduce import reduce_nodes
 from dap3d_core.formulations.joint.spread import body_accelerations, spread_tree
 from dap3d_core.formulations.joint_loops import kept_rows, layout
 from dap3d_core.formulations.joint_loops.equations import (
-    factorise,
-    power_of_kept_drivers,
+    reduce_with_kept_rows,
     solve,
     solve_kept,
+    store_kept,
 )
-from dap3d_core.formulations.joint_loops.loads import (
-    lacking_accelerations,
-    linearise_kept,
-    push_freedoms,
-)
+from dap3d_core.formulations.joint_loops.loads import lacking_accelerations, linearise_kept
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 __all__ = ["accepted", "project", "report", "rhs", "watch"]
@@ -83,12 +76,7 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     apply_forces(t, system, loops)
     linearise_kept(t, system, loops)
     add_contact_forces(t, system, loops)
-    power = reduce_nodes(system, system.force, True)
-    factorise(system)
-    lacking_accelerations(system)
-    solve_kept(system)
-    push_freedoms(system)
-    return power + power_of_kept_drivers(system)
+    return reduce_with_kept_rows(system)
 
 
 @compiled
@@ -125,15 +113,13 @@ def find_columns(t: float, system: System, loops: Any, count: int) -> None:
     """
     size, x, total = system.force.shape[0], system.multipliers, system.total
     without, loaded = system.friction[system.friction.shape[0] - size :], has_loads(system, count)
-    for k in range(size):
-        without[k] = system.force[k]
+    copy(without, system.force)
     if loaded:
         linearise_tree(t, system, loops)
     reduce_nodes(system, system.force, True)
-    factorise(system)
+    kept_rows.factorise(system, system.tree.kept.settings[layout.PART_OF_ROW])
     find_multipliers(system, loaded)
-    for k in range(x.shape[0]):
-        total[k] = x[k]
+    copy(total, x)
     for s in range(count):
         own, c = column(system, s), contact_of(system, s)
         force_of_one(t, c, system.friction[size:], system.acceleration, system, loops)
@@ -146,10 +132,8 @@ def find_columns(t: float, system: System, loops: Any, count: int) -> None:
         find_multipliers(system, loaded)
         for k in range(x.shape[0]):
             own[size + k] = x[k] - total[k]
-        for k in range(size):
-            system.force[k] = without[k]
-    for k in range(x.shape[0]):
-        x[k] = total[k]
+        copy(system.force, without)
+    copy(x, total)
     zero(total)
 
 
@@ -174,16 +158,6 @@ def solve_all(system: System) -> None:
 
 
 @compiled_into
-def store_kept(system: System) -> None:
-    """-lambda of the kept rows into ``multipliers``."""
-    kept = system.tree.kept
-    for q in range(kept.cuts.shape[0]):
-        first, place = kept.cuts[q, layout.FIRST], kept.cuts[q, layout.FIRST_ROW]
-        for r in range(kept.cuts[q, layout.ROW_COUNT]):
-            system.multipliers[place + r] = -kept.multipliers[first + r]
-
-
-@compiled_into
 def add_scaled(factor: float, c: int, of_contact: Floats, system: System) -> None:
     """Add a factor times the force of contact c to ``force``."""
     for side in range(BODY_I, BODY_J + 1):
@@ -205,7 +179,6 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
     accelerate(t, y, system, loops)
     linearise_tree(t, system, loops)
     solve_all(system)
-    power_of_drivers(system)
     body_accelerations(system, out)
     report_multipliers(system, out)
     report_levels(t, y, out, system, loops)
@@ -213,11 +186,8 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
 
 @compiled
 def watch(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
-    """Switches at a state into ``out``, by groups and instances; then distances from knots.
-
-    Those of closed contacts read multipliers.
-    """
-    place_of_next, loaded, n = system.settings[SCRATCH : SCRATCH + 1], 0, y.shape[0]
+    """Switches at a state into ``out``; those of closed contacts read multipliers."""
+    loaded, n = 0, y.shape[0]
     find_rates(t, y, system.watched[1 + n : 1 + 2 * n], system, loops)
     store_watched(t, y, system)
     for c in range(system.contacts.shape[0]):
@@ -227,5 +197,4 @@ def watch(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
         solve_all(system)
     else:
         store_kept(system)
-    place_of_next[0] = 0.0
-    call_kinds(SWITCH, KNOT, t, system, loops, out, place_of_next, system.multipliers)
+    read_switches(t, out, system, loops)

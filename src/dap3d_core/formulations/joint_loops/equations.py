@@ -12,7 +12,7 @@ The same S moves a state onto the kept rows: those of the tree cannot be violate
 from typing import Any
 
 from dap3d_core.assembly.arrays import SINGULAR, Floats, System
-from dap3d_core.assembly.evaluate import state_rates, zero
+from dap3d_core.assembly.evaluate import copy, state_rates, zero
 from dap3d_core.formulations.common.constraints import (
     power_of_drivers,
     report_levels,
@@ -33,7 +33,7 @@ from dap3d_core.formulations.joint.spread import body_accelerations, spread_tree
 from dap3d_core.formulations.joint_loops import kept_rows, layout, loads, profile
 from dap3d_core.formulations.lsq import minimum_norm_multipliers
 from dap3d_core.kernels.runtime.array_struct import pointer
-from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 #: Passes have converged where the square of the last change is this part at most; how much smaller
 #: parts are where they have not, which is to leave that much less; the least.
@@ -49,30 +49,21 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
         power = accelerate(t, system, loops, False)
     else:
         loads.linearise_kept(t, system, loops)
-        power = reduce_nodes(system, system.force, True)
-        factorise(system)
-        loads.lacking_accelerations(system)
-        solve_kept(system)
-        loads.push_freedoms(system)
-        power += power_of_kept_drivers(system)
+        power = reduce_with_kept_rows(system)
     spread_tree(y, out, system)
     state_rates(t, out, system, loops)
     out[out.shape[0] - 1] = power
 
 
-@compiled
-def factorise(system: System) -> None:
-    """Factors of the kept rows' matrix, of the inertias in ``tree.work``."""
-    loads.carry_rows(system)
-    factorise_anew(system, system.tree.kept.settings[layout.PART_OF_ROW])
-
-
-@compiled
-def factorise_anew(system: System, part: float) -> None:
-    """The same of loads that rows have put already, by a part of their squares."""
-    loads.multiply_loads(system)
-    profile.weigh_kept_rows(system, part)
-    profile.factor_profile(system)
+@compiled_into
+def reduce_with_kept_rows(system: System) -> float:
+    """What ``spread`` takes, and multipliers of linearised rows; returns the power."""
+    power = reduce_nodes(system, system.force, True)
+    kept_rows.factorise(system, system.tree.kept.settings[layout.PART_OF_ROW])
+    loads.lacking_accelerations(system)
+    solve_kept(system)
+    loads.push_freedoms(system)
+    return power + power_of_kept_drivers(system)
 
 
 @compiled
@@ -87,10 +78,10 @@ def solve_kept(system: System) -> None:
     # less than PART asks for its pivots alone
     while left > CONVERGED and part > LEAST and given == profile.PART:
         part *= SMALLER
-        factorise_anew(system, part)
+        kept_rows.factorise_anew(system, part)
         left = profile.solve_profile(system)
     if part < given and not left < SMALLER * first:
-        factorise_anew(system, given)
+        kept_rows.factorise_anew(system, given)
         profile.solve_profile(system)
 
 
@@ -119,7 +110,8 @@ def solve(system: System) -> None:
     spread_tree(system.tree.slope, system.tree.slope, system)
     store_reactions(system)
     zero(system.multipliers)
-    add_kept_reactions(system, system.change)
+    store_kept(system)
+    subtract_kept_reactions(system, system.change)
     joint_multipliers(system, system.change)
 
 
@@ -146,36 +138,34 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
     report_levels(t, y, out, system, loops)
     if system.tree.kept.settings[layout.PART_OF_ROW] > 0.0:
         for _ in range(2):
-            for k in range(system.total.shape[0]):
-                system.total[k] = system.multipliers[k]
+            copy(system.total, system.multipliers)
             minimum_norm_multipliers(system)
         report_multipliers(system, out)
 
 
-@compiled
-def add_kept_reactions(system: System, left: Floats) -> None:
-    """-lambda of the kept rows into ``multipliers``, and what is left for the joints of the tree.
+@compiled_into
+def store_kept(system: System) -> None:
+    """-lambda of the kept rows into ``multipliers``."""
+    kept = system.tree.kept
+    for q in range(kept.cuts.shape[0]):
+        first, place = kept.cuts[q, layout.FIRST], kept.cuts[q, layout.FIRST_ROW]
+        for r in range(kept.cuts[q, layout.ROW_COUNT]):
+            system.multipliers[place + r] = -kept.multipliers[first + r]
 
-    left: as of ``joint_multipliers``.
-    """
+
+@compiled
+def subtract_kept_reactions(system: System, left: Floats) -> None:
+    """What is left for the joints of the tree; left: as of ``joint_multipliers``."""
     kept = system.tree.kept
     cuts, ends, D = pointer(kept.cuts), pointer(kept.ends), pointer(system.D)
     for q in range(kept.cuts.shape[0]):
         c = layout.CUT_WIDTH * q
-        rows, first, place = (
-            cuts[c + layout.ROW_COUNT],
-            cuts[c + layout.FIRST],
-            cuts[c + layout.FIRST_ROW],
-        )
-        for r in range(rows):
-            system.multipliers[place + r] = -kept.multipliers[first + r]
+        rows, first = cuts[c + layout.ROW_COUNT], cuts[c + layout.FIRST]
         for e in range(cuts[c + layout.FIRST_END], cuts[c + layout.LAST_END]):
             b = 6 * ends[layout.END_WIDTH * e + layout.END_BODY]
             for r in range(rows):
-                d, x = (
-                    ends[layout.END_WIDTH * e + layout.END_BLOCK] + 6 * r,
-                    kept.multipliers[first + r],
-                )
+                d = ends[layout.END_WIDTH * e + layout.END_BLOCK] + 6 * r
+                x = kept.multipliers[first + r]
                 for i in range(6):
                     left[b + i] -= D[d + i] * x
 

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import LENGTH, VALUE, Floats, System
-from dap3d_core.assembly.evaluate import call_kinds, largest_weighted
+from dap3d_core.assembly.arrays import LENGTH, Floats, System
+from dap3d_core.assembly.evaluate import largest_weighted
 from dap3d_core.assembly.turns import vector_of
 from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.formulations.joint.equations import normalise_rotations
+from dap3d_core.formulations.joint.equations import place as place  # read by projection.py
 from dap3d_core.formulations.joint.place import place_tree, put
 from dap3d_core.formulations.joint.reduce import reduce_nodes
 from dap3d_core.formulations.joint.spread import spread_tree
@@ -25,13 +26,6 @@ from dap3d_core.kernels.scalar_math import where
 LESS, HELD = 16.0, 10.0
 
 normalise, linearise = normalise_rotations, loads.linearise_kept
-
-
-@compiled_into
-def place(t: float, y: Floats, system: System, loops: Any) -> None:
-    """Place the bodies of a state, and evaluate functions of time."""
-    place_tree(y, system)
-    call_kinds(VALUE, VALUE, t, system, loops, system.force, system.force, system.force)
 
 
 @compiled_into
@@ -59,15 +53,28 @@ def factorise_anyway(system: System, part: float | None) -> bool:
     the start; ``part`` is not used.
     """
     reduce_nodes(system, system.force, True)
-    loads.carry_rows(system)
-    loads.multiply_loads(system)
-    profile.weigh_kept_rows(system, system.tree.kept.settings[layout.PART_OF_ROW])
-    if profile.factor_profile(system):
+    if factorise(system, system.tree.kept.settings[layout.PART_OF_ROW]):
         return True
-    loads.multiply_loads(system)
-    profile.weigh_kept_rows(system, profile.PART)
-    profile.factor_profile(system)
+    factorise_anew(system, profile.PART)
     return False
+
+
+@compiled
+def factorise(system: System, part: float) -> bool:
+    """Factors of the kept rows' matrix, of the inertias in ``tree.work``; True if they exist.
+
+    part: of the rows' squares, that regularises them.
+    """
+    loads.carry_rows(system)
+    return factorise_anew(system, part)
+
+
+@compiled
+def factorise_anew(system: System, part: float) -> bool:
+    """The same of loads that rows have put already."""
+    loads.multiply_loads(system)
+    profile.weigh_kept_rows(system, part)
+    return profile.factor_profile(system)
 
 
 @compiled_into
@@ -122,9 +129,7 @@ def have_come_to_hold(system: System) -> bool:
     kept = system.tree.kept
     for j in range(kept.profile.shape[0]):
         kept.solution[j] = kept.matrix[kept.profile[j, layout.PLACE] + j]
-    loads.multiply_loads(system)
-    profile.weigh_kept_rows(system, kept.settings[layout.PART_OF_FACTORS] / LESS)
-    profile.factor_profile(system)
+    factorise_anew(system, kept.settings[layout.PART_OF_FACTORS] / LESS)
     for j in range(kept.profile.shape[0]):
         inverse = kept.matrix[kept.profile[j, layout.PLACE] + j]
         if kept.smallest[j] == 0.0 and inverse < HELD * kept.solution[j]:

@@ -65,26 +65,23 @@ def carry_rows(system: System) -> None:
         for i in range(6 * rows * (cuts[c + layout.LAST_STEP] - first)):
             x[i] = 0.0
         for e in range(cuts[c + layout.FIRST_END], cuts[c + layout.LAST_END]):
-            step, block = (
-                ends[layout.END_WIDTH * e + layout.END_STEP],
-                ends[layout.END_WIDTH * e + layout.END_BLOCK],
-            )
-            k = node.WORK_WIDTH * ways[layout.STEP_WIDTH * step + layout.NODE]
-            apply_rows(
-                D, block, rows, vector_of(K, k + node.CENTRE_NOW), x, 6 * rows * (step - first)
-            )
+            end = layout.END_WIDTH * e
+            step, block = ends[end + layout.END_STEP], ends[end + layout.END_BLOCK]
+            k, at = node.WORK_WIDTH * ways[layout.STEP_WIDTH * step + layout.NODE], step - first
+            apply_rows(D, block, rows, vector_of(K, k + node.CENTRE_NOW), x, 6 * rows * at)
         for step in range(first, cuts[c + layout.LAST_STEP]):
             s = layout.STEP_WIDTH * step
             n, at = ways[s + layout.NODE], 6 * rows * (step - first)
             k, motion = node.WORK_WIDTH * n, tree[node.TREE_WIDTH * n + node.MOTION]
+            place = ways[s + layout.LOADS]
             if motion == node.REVOLUTE:
-                pass_turn(K, k, rows, x, at, g, ways[s + layout.LOADS])
+                pass_axis(K, k, rows, x, at, g, place, 0)
             elif motion == node.PRISMATIC:
-                pass_slide(K, k, rows, x, at, g, ways[s + layout.LOADS])
+                pass_axis(K, k, rows, x, at, g, place, 3)
             elif motion == node.SPHERICAL:
-                pass_ball(K, k, rows, x, at, g, ways[s + layout.LOADS], 3)
+                pass_ball(K, k, rows, x, at, g, place, 3)
             elif motion == node.FREE:
-                pass_ball(K, k, rows, x, at, g, ways[s + layout.LOADS], 6)
+                pass_ball(K, k, rows, x, at, g, place, 6)
             if ways[s + layout.NEXT_STEP] >= 0:
                 up = 6 * rows * (ways[s + layout.NEXT_STEP] - first)
                 carry_on(vector_of(K, k + node.LINK_NOW), rows, x, at, up)
@@ -101,32 +98,15 @@ def apply_rows(D: Floats, block: int, rows: int, arm: Any, x: Floats, at: int) -
 
 
 @compiled_into
-def pass_turn(K: Floats, k: int, rows: int, x: Floats, at: int, g: Floats, place: int) -> None:
-    """Take from loads what the freedom of a rotation takes."""
-    axis, u, v = (
-        vector_of(K, k + node.AXIS_NOW),
-        vector_of(K, k + node.GAIN),
-        vector_of(K, k + node.GAIN + 3),
-    )
+def pass_axis(
+    K: Floats, k: int, rows: int, x: Floats, at: int, g: Floats, place: int, part: int
+) -> None:
+    """Take from loads what the freedom about an axis takes, or along it: of their part 0, or 3."""
+    axis = vector_of(K, k + node.AXIS_NOW)
+    u, v = vector_of(K, k + node.GAIN), vector_of(K, k + node.GAIN + 3)
     for r in range(rows):
         o = at + 6 * r
-        along = dot(axis, vector_of(x, o))
-        g[place + r] = along
-        put(x, o, sub(vector_of(x, o), scale(along, u)))
-        put(x, o + 3, sub(vector_of(x, o + 3), scale(along, v)))
-
-
-@compiled_into
-def pass_slide(K: Floats, k: int, rows: int, x: Floats, at: int, g: Floats, place: int) -> None:
-    """Take from loads what the freedom of a translation takes."""
-    axis, u, v = (
-        vector_of(K, k + node.AXIS_NOW),
-        vector_of(K, k + node.GAIN),
-        vector_of(K, k + node.GAIN + 3),
-    )
-    for r in range(rows):
-        o = at + 6 * r
-        along = dot(axis, vector_of(x, o + 3))
+        along = dot(axis, vector_of(x, o + part))
         g[place + r] = along
         put(x, o, sub(vector_of(x, o), scale(along, u)))
         put(x, o + 3, sub(vector_of(x, o + 3), scale(along, v)))
@@ -181,9 +161,8 @@ def multiply_loads(system: System) -> None:
                     S[at + e] += dot(n, vector_of(g, right + 3 * e))
             elif motion == node.FREE:
                 n = solve_factored(six_of(K, k + node.FACTORS_FREE), vector_of(g, left + 6 * r))
-                f = solve_factored(
-                    factors_of(six_of(K, k + node.MATRIX_M)), vector_of(g, left + 6 * r + 3)
-                )
+                M = factors_of(six_of(K, k + node.MATRIX_M))
+                f = solve_factored(M, vector_of(g, left + 6 * r + 3))
                 for e in range(count):
                     o = right + 6 * e
                     S[at + e] += dot(n, vector_of(g, o)) + dot(f, vector_of(g, o + 3))
@@ -205,10 +184,8 @@ def lacking_accelerations(system: System) -> None:
         for r in range(rows):
             right[first + r] = system.gamma[cuts[c + layout.FIRST_ROW] + r]
         for e in range(cuts[c + layout.FIRST_END], cuts[c + layout.LAST_END]):
-            step, block = (
-                ends[layout.END_WIDTH * e + layout.END_STEP],
-                ends[layout.END_WIDTH * e + layout.END_BLOCK],
-            )
+            end = layout.END_WIDTH * e
+            step, block = ends[end + layout.END_STEP], ends[end + layout.END_BLOCK]
             k = node.WORK_WIDTH * ways[layout.STEP_WIDTH * step + layout.NODE]
             a = vector_of(K, k + node.ACCELERATION)
             a = add(a, times(K, k + node.SPIN, vector_of(K, k + node.CENTRE_NOW)))
@@ -232,11 +209,8 @@ def subtract_free_rates(system: System, s: int, rows: int, first: int) -> None:
     """Subtract what the rates of a node do to rows that pass it; s: place of the step."""
     K, ways, g = pointer(system.tree.work), pointer(system.tree.kept.ways), system.tree.kept.loads
     n, right = ways[s + layout.NODE], system.tree.kept.right
-    k, motion, place = (
-        node.WORK_WIDTH * n,
-        system.tree.nodes[n, node.MOTION],
-        ways[s + layout.LOADS],
-    )
+    k, motion = node.WORK_WIDTH * n, system.tree.nodes[n, node.MOTION]
+    place = ways[s + layout.LOADS]
     if motion == node.SPHERICAL:
         for r in range(rows):
             right[first + r] -= dot(vector_of(g, place + 3 * r), vector_of(K, k + node.MOMENT))
@@ -263,10 +237,8 @@ def lacking_velocities(system: System) -> None:
         for r in range(rows):
             right[first + r] = system.nu[cuts[c + layout.FIRST_ROW] + r]
         for e in range(cuts[c + layout.FIRST_END], cuts[c + layout.LAST_END]):
-            o, block = (
-                BODY_WIDTH * ends[layout.END_WIDTH * e + layout.END_BODY],
-                ends[layout.END_WIDTH * e + layout.END_BLOCK],
-            )
+            end = layout.END_WIDTH * e
+            o, block = BODY_WIDTH * ends[end + layout.END_BODY], ends[end + layout.END_BLOCK]
             subtract_product(D, block, rows, vector_of(b, o + V), vector_of(b, o + W), right, first)
 
 

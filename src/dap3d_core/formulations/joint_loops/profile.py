@@ -7,6 +7,7 @@ diagonal 1/d is stored.
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, System
+from dap3d_core.assembly.evaluate import copy, zero
 from dap3d_core.assembly.metric import in_body_axes, scaled_moment
 from dap3d_core.formulations.common.constraints import slide_sharing
 from dap3d_core.formulations.joint_loops import layout
@@ -42,8 +43,7 @@ def weigh_kept_rows(system: System, part: float) -> None:
     """
     kept = system.tree.kept
     kept.settings[layout.PART_OF_FACTORS] = part
-    for j in range(kept.compliance.shape[0]):
-        kept.compliance[j] = 0.0
+    zero(kept.compliance)
     if part == 0.0:
         return
     contacts, shares = system.contacts.shape[0] > 0, slide_sharing(system)
@@ -106,11 +106,9 @@ def solve_profile(system: System) -> float:
     kept = system.tree.kept
     right, x, z, E = kept.right, kept.multipliers, kept.solution, kept.compliance
     size = x.shape[0]
-    for k in range(size):
-        z[k] = right[k]
+    copy(z, right)
     substitute(system, z)
-    for k in range(size):
-        x[k] = z[k]
+    copy(x, z)
     if size == 0 or E[0] == 0.0:
         return 0.0
     change, total, before = 0.0, 0.0, np.inf

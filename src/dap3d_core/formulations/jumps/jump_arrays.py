@@ -28,29 +28,21 @@ VALUE, SIDE, CROSSING = range(3)
 NOW, BEFORE, FASTEST, OLD = range(4)
 
 
-def _integer() -> Scalar[int]:
-    return Scalar("integer")
-
-
-def _real() -> Scalar[float]:
-    return Scalar("real")
-
-
 @attrs.define(eq=False, kw_only=True, slots=False)
 class JumpArrays(Arrays):
     """Elements that jump, and scratch of the law; m rows at the most, 6 n + 6 velocities."""
 
-    soon = _real()  # s, what closes within it is closed
-    work = _real()  # of all impulses, J
-    exchanged = _real()  # sum of the magnitudes of its parts, J
+    soon = Scalar[float]("real")  # s, what closes within it is closed
+    work = Scalar[float]("real")  # of all impulses, J
+    exchanged = Scalar[float]("real")  # sum of the magnitudes of its parts, J
 
-    most_rounds = _integer()
-    given_count = _integer()  # rows of the first round besides those of elements
-    follows = _integer()  # velocities follow the joints with states that have been set
-    has_sides = _integer()  # sides are given
-    rounds = _integer()
-    row_count = _integer()  # of the present round
-    missed = _integer()  # -1, or the element whose row joints hold, or -2 where it is of none
+    most_rounds = Scalar[int]("integer")
+    given_count = Scalar[int]("integer")  # rows of the first round besides those of elements
+    follows = Scalar[int]("integer")  # velocities follow the joints with states that have been set
+    has_sides = Scalar[int]("integer")  # sides are given
+    rounds = Scalar[int]("integer")
+    row_count = Scalar[int]("integer")  # of the present round
+    missed = Scalar[int]("integer")  # element whose row joints hold; -1: none, -2: a given row
 
     real: Floats
     integer: Integers

@@ -74,8 +74,8 @@ def hold(t: float, j: JumpArrays, of_held: Any, held: System, held_loops: Any) -
     """Factors of the joints at the state; what is off their velocities waits to be taken away."""
     factor = of_held[FACTOR]
     factor(t, j.y, j.solution, held, held_loops)
-    for k in range(j.residual.shape[0]):
-        j.residual[k], j.nu[k] = held.residual[k], held.nu[k]
+    copy(j.residual, held.residual)
+    copy(j.nu, held.nu)
 
 
 @compiled
@@ -232,12 +232,10 @@ def unit_rows(j: JumpArrays, of_held: Any, held: System, held_loops: Any) -> Non
         for c in range(size):
             j.scaled[q, c] /= length
         copy(j.solution[:size], j.scaled[q])
-        for k in range(j.residual.shape[0]):
-            j.solution[size + k] = 0.0
+        zero(j.solution[size:])
         solve(0.0, j.y, j.solution, held, held_loops)
         copy(j.x[q], j.solution[:size])
-        for k in range(j.residual.shape[0]):
-            j.held[q, k] = j.solution[size + k]
+        copy(j.held[q], j.solution[size:])
     for q in range(m):
         for r in range(q + 1):
             part = 0.0

@@ -134,9 +134,7 @@ def program_rates(
         with nullcontext() if k == RHS else suppress(CompileError, TraceError):
             unit = wide_unit(f"{name}-{k}x{count}", count, write, optimise=False)
             functions[k] = Entry(unit, 0, SIGNATURE)
-    names = [name for name, array in evaluator.system.walk() if array.dtype == float]
-    loops = evaluator.loops.entries
-    return WideRates(evaluator, state.size, count, names, functions, loops)
+    return WideRates(evaluator, state.size, count, None, functions, evaluator.loops.entries)
 
 
 #: Kinds of group loops that it calls, and the arrays of a system that it reads and writes.

@@ -20,16 +20,6 @@ from dap3d_core.assembly.arrays import Integers, System
 from dap3d_core.assembly.evaluate import zero
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.stabilized_index2 import jacobian
-from dap3d_core.formulations.stabilized_index2.jacobian import (
-    StateTangent,
-    Tangent,
-    call_element,
-    clear,
-    scale_column,
-    scale_columns,
-    seed_positions,
-    seed_velocities,
-)
 from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.interface.codegen.kernel_arguments import in_order, parameters
 from dap3d_core.interface.codegen.loop_source import computes_rate, stride
@@ -51,7 +41,7 @@ OF_LOOPS = ("D", "gamma", "nu", "minus_lambda", "force", "out", "kept", "ahead")
 _BLOCK = 72
 
 
-def make_tangent(evaluator: Evaluator) -> tuple[Tangent, Any]:
+def make_tangent(evaluator: Evaluator) -> tuple[jacobian.Tangent, Any]:
     """Tables and arrays of the tangent of an evaluator's model; all loops, with those it calls."""
     system, plan, model = evaluator.system, evaluator.plan, evaluator.model
     n = model.body_count
@@ -90,7 +80,7 @@ def make_tangent(evaluator: Evaluator) -> tuple[Tangent, Any]:
         widest = max(widest, 6 * slots + rows, layout.state_width)
     blocks = [(where, a, b) for (a, b), where in place.items()]
     sizes = (plan.block_size, *(3 * [plan.row_size]), system.force.size, *(3 * [widest]))
-    tangent = Tangent(
+    tangent = jacobian.Tangent(
         elements=np.array(elements, dtype=np.int64).reshape(-1, jacobian.ELEMENT_WIDTH),
         pairs=np.concatenate([np.zeros(0, dtype=np.int64), *pairs]),
         blocks=np.array(blocks, dtype=np.int64).reshape(-1, 3),
@@ -118,7 +108,7 @@ def _wide(system: Any) -> LoopArrays:
     return LoopArrays(idx=system.idx, **wide)
 
 
-def _state_tangent(model: Model, at: Sequence[int]) -> StateTangent:
+def _state_tangent(model: Model, at: Sequence[int]) -> jacobian.StateTangent:
     """Tables and arrays of the derivatives by and of states; at: as of ``StateTangent``."""
     records: list[tuple[int, ...]] = []
     record = np.zeros(model.state_count, dtype=np.int64)
@@ -131,7 +121,7 @@ def _state_tangent(model: Model, at: Sequence[int]) -> StateTangent:
             places = np.cumsum([size, m * m, 12 * m * slots, 6 * m * slots, rows * m, rows * m])
             records.append((m, *places[:-1].tolist(), slots, rows))
             start, size = start + m, int(places[-1])
-    return StateTangent(
+    return jacobian.StateTangent(
         at=np.array(at, dtype=np.int64),
         records=np.array(records, dtype=np.int64).reshape(-1, 8),
         record=record,
@@ -182,7 +172,7 @@ FIRST, UNKNOWN, DIAGONAL, JOINT_BLOCK, NODE_ROWS, ROW_SHIFT, FIRST_ROW, WIDTH_OF
 
 
 @compiled
-def differentiate_states(t: float, system: System, loops: Any, tangent: Tangent) -> None:
+def differentiate_states(t: float, system: System, loops: Any, tangent: jacobian.Tangent) -> None:
     """Derivatives by and of all states, at the state that ``differentiate`` took.
 
     Args:
@@ -203,7 +193,7 @@ def differentiate_states(t: float, system: System, loops: Any, tangent: Tangent)
 
 @compiled
 def differentiate_by_states(
-    t: float, e: int, q: int, system: System, loops: Any, tangent: Tangent
+    t: float, e: int, q: int, system: System, loops: Any, tangent: jacobian.Tangent
 ) -> None:
     """Add the derivatives of what an element returns by its own states, unscaled."""
     row, own, z = tangent.elements[e], tangent.states, tangent.wide.states
@@ -212,7 +202,7 @@ def differentiate_by_states(
     m, size = record[jacobian.COUNT], 6 * row[jacobian.SLOT_COUNT]
     for k in range(m):
         z[jacobian.WIDTH * (first + k) + 1] = 1.0
-        call_element(t, e, q, system, loops, tangent)
+        jacobian.call_element(t, e, q, system, loops, tangent)
         z[jacobian.WIDTH * (first + k) + 1] = 0.0
         if row[jacobian.KIND] == jacobian.RATE_ELEMENT:
             add_column(0, m, record[jacobian.RATE_BY_STATE] + k, m, tangent)
@@ -225,7 +215,7 @@ def differentiate_by_states(
 
 
 @compiled
-def add_column(first: int, count: int, place: int, stride: int, tangent: Tangent) -> None:
+def add_column(first: int, count: int, place: int, stride: int, tangent: jacobian.Tangent) -> None:
     """Add slopes of ``count`` outputs of an element to every stride-th value from a place on."""
     for c in range(count):
         tangent.states.values[place + stride * c] += tangent.out[jacobian.WIDTH * (first + c) + 1]
@@ -233,7 +223,7 @@ def add_column(first: int, count: int, place: int, stride: int, tangent: Tangent
 
 @compiled
 def differentiate_rate(
-    t: float, e: int, q: int, system: System, loops: Any, tangent: Tangent
+    t: float, e: int, q: int, system: System, loops: Any, tangent: jacobian.Tangent
 ) -> None:
     """Derivatives of the rates of an element by the coordinates of its bodies, unscaled."""
     row, own, wide = tangent.elements[e], tangent.states, tangent.wide
@@ -244,28 +234,25 @@ def differentiate_rate(
         b, o = system.idx[i0 + n], record[jacobian.RATE_BY_BODY] + 12 * m * n
         if b == 0:
             continue
-        seed_positions(wide.body[b], system.body[b])
+        jacobian.seed_positions(wide.body[b], system.body[b])
         for level in range(1 + row[jacobian.VELOCITY]):
             if level == 1:
-                seed_velocities(wide.body[b], system.body[b])
-            call_element(t, e, q, system, loops, tangent)
+                jacobian.seed_velocities(wide.body[b], system.body[b])
+            jacobian.call_element(t, e, q, system, loops, tangent)
             for k in range(m):
                 for c in range(6):
                     own.values[o + 12 * k + 6 * level + c] = tangent.out[jacobian.WIDTH * k + 1 + c]
-        clear(wide.body[b])
+        jacobian.clear(wide.body[b])
 
 
 @compiled
-def scale_state_tangent(system: System, tangent: Tangent) -> None:
+def scale_state_tangent(system: System, tangent: jacobian.Tangent) -> None:
     """Derivatives into the bodies' scaled coordinates."""
     own, v = tangent.states, tangent.states.values
     for e in range(tangent.elements.shape[0]):
         row = tangent.elements[e]
-        for q in range(
-            system.groups[row[jacobian.LOOP], 2]
-            if row[jacobian.KIND] == jacobian.RATE_ELEMENT
-            else 0
-        ):
+        is_rate = row[jacobian.KIND] == jacobian.RATE_ELEMENT
+        for q in range(system.groups[row[jacobian.LOOP], 2] if is_rate else 0):
             i0 = system.groups[row[jacobian.LOOP], 0] + q * row[jacobian.STRIDE]
             record = own.records[own.record[system.idx[i0 + tangent.states.at[e]]]]
             m = record[jacobian.COUNT]
@@ -274,16 +261,16 @@ def scale_state_tangent(system: System, tangent: Tangent) -> None:
                 s, k = system.body[b], system.metric[b]
                 o = record[jacobian.RATE_BY_BODY] + 12 * m * n
                 for c in range(m if b > 0 else 0):
-                    scale_columns(v, o + 12 * c, k, s)
-                    scale_columns(v, o + 12 * c + 6, k, s)
+                    jacobian.scale_columns(v, o + 12 * c, k, s)
+                    jacobian.scale_columns(v, o + 12 * c + 6, k, s)
                 o = record[jacobian.FORCE_BY_STATE] + 6 * m * n
                 for c in range(o, o + m if b > 0 else o):
-                    scale_column(v, c, m, k, s)
+                    jacobian.scale_column(v, c, m, k, s)
 
 
 @compiled
 def fill_states(s: Any, K: Any, nodes: Integers, places: Integers, held: Integers,
-                tangent: Tangent) -> None:  # fmt: skip
+                tangent: jacobian.Tangent) -> None:  # fmt: skip
     """The blocks of states in s - J, for real or complex s in 1/s.
 
     Args:

@@ -15,8 +15,8 @@ from dap3d_core.kernels.compiler.types import CompileError
 from dap3d_core.kernels.compiler.writer import EXACT
 
 NUMBER = re.compile(r"(?<![\w.%@])(?:0x[0-9A-F]{16}|-?\d+\.\d+)(?![\w.])")
-_DOUBLE = re.compile(r"(?<![\w.%@])double(?![\w.])")
-_RESULT = re.compile(r"  (%[\w.]+) = (.*)")
+DOUBLE = re.compile(r"(?<![\w.%@])double(?![\w.])")
+RESULT = re.compile(r"  (%[\w.]+) = (.*)")
 CALL = re.compile(r"call double @(\w[\w.]*)\(([^)]*)\)")
 _JOINED = re.compile(r"(and|or|xor) i1 (\S+), (\S+)")
 _SELECTED = re.compile(r"select i1 (%[\w.]+), (\w+) ([^,]+), \w+ (.+)")
@@ -51,7 +51,7 @@ class VectorWriter:
 
     def lines(self, line: str) -> Iterator[str]:
         """The lines that take the place of one."""
-        found = _RESULT.fullmatch(line)
+        found = RESULT.fullmatch(line)
         name, text = found.groups() if found else ("", line)
         if found and (written := self.special(name, text)) is not None:
             yield from written
@@ -65,8 +65,8 @@ class VectorWriter:
     def wide(self, text: str) -> str:
         """A text with vectors in the place of numbers."""
         if text.startswith("getelementptr"):
-            return _DOUBLE.sub(f"[{self.count} x double]", text)
-        vectors = _DOUBLE.sub(self.vector, NUMBER.sub(lambda n: self.constant(n[0]), text))
+            return DOUBLE.sub(f"[{self.count} x double]", text)
+        vectors = DOUBLE.sub(self.vector, NUMBER.sub(lambda n: self.constant(n[0]), text))
         return vectors.replace("DOUBLE", "double")
 
 

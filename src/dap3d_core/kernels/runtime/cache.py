@@ -179,12 +179,19 @@ def _entries_of(functions: Sequence[Any], arguments: tuple[Any, ...]) -> list[En
         signatures = [program.export(f, arguments, symbol) for f, symbol in pairs]
         return program.module(), [_name_of(s.result) for s in signatures]
 
-    with _making:
-        if name not in _units:
-            _units[name] = Unit(name, len(plain), write, cache_folder(), ready_name=ready_name)
-        unit = _units[name]
+    unit = unit_of(name, len(plain), write, ready_name=ready_name)
     signatures = [Signature(arguments, _RESULTS[r]) for r in unit.results]
     return [Entry(unit, k, s) for k, s in enumerate(signatures)]
+
+
+def unit_of(
+    name: str, count: int, write: Any, *, optimise: bool = False, ready_name: str = ""
+) -> Unit:
+    """A unit of so many functions, made once in a process; arguments as of ``Unit``."""
+    with _making:
+        if name not in _units:
+            _units[name] = Unit(name, count, write, cache_folder(), optimise, ready_name)
+        return _units[name]
 
 
 def _name_of(result: Scalar) -> str:

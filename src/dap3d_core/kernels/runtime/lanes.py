@@ -8,7 +8,6 @@ has alone, and the others are its derivatives. Item k of all lanes lies together
 import ctypes
 import functools
 import inspect
-import threading
 from collections.abc import Callable, Collection, Iterator
 from typing import Any
 
@@ -23,15 +22,13 @@ from dap3d_core.kernels.compiler.lanes import widen
 from dap3d_core.kernels.compiler.types import COMPLEX, FLOAT, Signature, Struct, Tuple
 from dap3d_core.kernels.compiler.units import Entry, Functions, Unit, address_of, type_of
 from dap3d_core.kernels.runtime.array_struct import Arrays
-from dap3d_core.kernels.runtime.cache import cache_folder, names_of
+from dap3d_core.kernels.runtime.cache import names_of, unit_of
 from dap3d_core.kernels.runtime.source_digest import origin
 
 #: Numbers at whose multiples arrays begin: those of a register of the widest vectors.
 ALIGNMENT = 8
 #: Of each array that owns its memory: its numbers, and those of all lanes.
 Buffers = dict[int, tuple[Floats, Floats]]
-_units: dict[str, Unit] = {}
-_making = threading.Lock()
 
 
 @functools.cache
@@ -74,17 +71,7 @@ def wide_unit(name: str, count: int, text: Callable[[str], str], *, optimise: bo
     def write(symbols: list[str]) -> tuple[str, list[Any]]:
         return widen(text(symbols[0]), count), ["None"]
 
-    return unit_of(name, 1, write, optimise)
-
-
-def unit_of(
-    name: str, functions: int, write: Any, optimise: bool = False, ready_name: str = ""
-) -> Unit:
-    """A unit of so many functions, made once; arguments as of ``Unit``."""
-    with _making:
-        if name not in _units:
-            _units[name] = Unit(name, functions, write, cache_folder(), optimise, ready_name)
-        return _units[name]
+    return unit_of(name, 1, write, optimise=optimise)
 
 
 def differentiated(entry: Entry, count: int) -> Entry:
@@ -129,13 +116,17 @@ class WideArrays:
     """
 
     def __init__(
-        self, arrays: Arrays, count: int, names: Collection[str], buffers: Buffers | None = None
+        self,
+        arrays: Arrays,
+        count: int,
+        names: Collection[str] | None,
+        buffers: Buffers | None = None,
     ) -> None:
         """Args:
         arrays: of one scene.
         count: scenes.
         names: arrays of floats that each scene has for itself, those of further structs behind a
-            dot. Wide code may read no other.
+            dot; None: all. Wide code may read no other.
         buffers: of other structs, which may share memory with this one.
         """
         self.type, self._count = arrays.type_of(), count
@@ -143,7 +134,7 @@ class WideArrays:
         self._tables: list[Any] = []
         self.address = self._table(arrays, names, "")
 
-    def _table(self, arrays: Arrays, names: Collection[str], before: str) -> int:
+    def _table(self, arrays: Arrays, names: Collection[str] | None, before: str) -> int:
         words: list[int] = []
         for name, type_ in arrays.type_of().members:
             array = getattr(arrays, name)
@@ -151,13 +142,10 @@ class WideArrays:
                 has = array is not None
                 words.append(self._table(array, names, f"{before}{name}.") if has else 0)
                 continue
-            own = self._is_own(before + name, names) and type_.item in (FLOAT, COMPLEX)
+            own = (names is None or before + name in names) and type_.item in (FLOAT, COMPLEX)
             words += [address_of(self.matrix(array) if own else array), *array.shape]
         self._tables.append(np.array(words, dtype=np.int64))
         return address_of(self._tables[-1])
-
-    def _is_own(self, name: str, names: Collection[str]) -> bool:
-        return name in names
 
     def matrix(self, array: Floats) -> Floats:
         """(size, count) view: the items of an array of one scene, for each scene.
@@ -193,7 +181,7 @@ class DifferentiatedArrays(WideArrays):
         """Args: the arrays; numbers for each of theirs; those of other structs, to be shared."""
         width, self._first = layout(count)
         self._lanes = slice(self._first, self._first + count - 1)
-        super().__init__(arrays, width, (), buffers)
+        super().__init__(arrays, width, None, buffers)
 
     def matrix(self, array: Floats) -> Floats:
         """As of ``WideArrays``; with the numbers of the array, where it is new."""
@@ -203,9 +191,6 @@ class DifferentiatedArrays(WideArrays):
             flat, wide = list(self._buffers.values())[-1]
             wide[:, 0] = flat
         return matrix
-
-    def _is_own(self, name: str, names: Collection[str]) -> bool:
-        return True
 
     def take(self) -> None:
         """Take over numbers that Python has changed: their slopes become zero."""

@@ -12,7 +12,6 @@ one list and is never recompiled for a new type:
     out1, out2, out3  what the kernels return, flat
 """
 
-import threading
 from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any, NamedTuple
@@ -20,9 +19,9 @@ from typing import Any, NamedTuple
 from dap3d_core.kernels import table_lookup
 from dap3d_core.kernels.compiler.trace import trace
 from dap3d_core.kernels.compiler.types import Struct
-from dap3d_core.kernels.compiler.units import Entry, Unit
+from dap3d_core.kernels.compiler.units import Entry
 from dap3d_core.kernels.runtime import generated_modules, loop_support
-from dap3d_core.kernels.runtime.cache import cache_folder, jit_is_on, names_of
+from dap3d_core.kernels.runtime.cache import jit_is_on, names_of, unit_of
 from dap3d_core.kernels.runtime.function_lists import LOOP, LoopArrays
 from dap3d_core.kernels.runtime.source_digest import (
     places,
@@ -35,9 +34,7 @@ from dap3d_core.kernels.runtime.source_digest import (
 #: Functions that the text of loops calls.
 _SUPPORT = (loop_support.vector_at, loop_support.matrix_at, loop_support.unwound,
             loop_support.doubtful, table_lookup.lookup)  # fmt: skip
-_built: dict[tuple[str, str], Callable] = {}
-#: Held while a loop is built, as several threads may need it at once.
-_building = threading.Lock()
+_built: dict[str, Callable] = {}
 #: Names of the loops that this process had to compile (not those it found in the cache).
 compiled_here: list[str] = []
 
@@ -73,11 +70,22 @@ def build(loop: Loop, announce: Callable[[str], None] | None = None) -> Callable
         CompileError: a kernel does what only numbers can; names its line, and what to do.
     """
     text = source_of(loop)
-    names = unit_names(loop, text)
-    with _building:
-        if names not in _built:
-            _built[names] = _build(loop, text, *names, announce)
-        return _built[names]
+    ready_name, name = unit_names(loop, text)
+
+    def write(symbols: list[str]) -> tuple[str, list[Any]]:
+        if announce is not None:
+            announce(loop.name)
+        refuse_outer_references(*loop.kernels.values())
+        compiled_here.append(loop.name)
+        return trace(symbols[0], _module(loop, text, name), array_members()), ["None"]
+
+    if name not in _built:
+        if jit_is_on():
+            unit = unit_of(name, 1, write, optimise=True, ready_name=ready_name)
+            _built.setdefault(name, Entry(unit, 0, LOOP))
+        else:
+            _built.setdefault(name, _module(loop, text, name)["loop"])
+    return _built[name]
 
 
 def unit_names(loop: Loop, text: str) -> tuple[str, str]:
@@ -128,7 +136,6 @@ def build_differentiated(loop: Loop, count: int) -> Entry:
     that of all loops.
     """
     from dap3d_core.kernels.compiler.derivatives import differentiate
-    from dap3d_core.kernels.runtime.lanes import unit_of
 
     text = source_of(loop)
     ready_name, name = (f"slopes{count}.{one}" for one in unit_names(loop, text))
@@ -150,22 +157,6 @@ def _module(loop: Loop, text: str, name: str) -> dict[str, Any]:
     namespace = generated_modules.load(None, name, text)
     namespace.update(loop.kernels)
     return namespace
-
-
-def _build(
-    loop: Loop, text: str, ready_name: str, name: str, announce: Callable[[str], None] | None
-) -> Callable:
-    def write(symbols: list[str]) -> tuple[str, list[Any]]:
-        if announce is not None:
-            announce(loop.name)
-        refuse_outer_references(*loop.kernels.values())
-        compiled_here.append(loop.name)
-        return trace(symbols[0], _module(loop, text, name), array_members()), ["None"]
-
-    if not jit_is_on():
-        return _module(loop, text, name)["loop"]
-    unit = Unit(name, 1, write, cache_folder(), optimise=True, ready_name=ready_name)
-    return Entry(unit, 0, LOOP)
 
 
 def array_members() -> dict[str, tuple[int, str, int]]:

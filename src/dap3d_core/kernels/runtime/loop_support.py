@@ -11,29 +11,10 @@ R, A, V, W, P, MASS, JP, BODY_WIDTH = 0, 3, 12, 15, 18, 22, 23, 32
 TURN = 6.283185307179586
 
 __all__ = [
-    "JP",
-    "MASS",
-    "A",
-    "P",
-    "R",
-    "V",
-    "W",
-    "add",
-    "angle_about",
-    "cross",
-    "dot",
-    "matrix_at",
-    "matrix_in",
-    "rotate",
-    "sub",
-    "doubtful",
-    "unwound",
-    "vector_at",
-    "vector_in",
-    "where",
-    "whole",
+    "JP", "MASS", "A", "P", "R", "V", "W", "add", "angle_about", "cross", "dot", "matrix_at",
+    "matrix_in", "rotate", "sub", "doubtful", "unwound", "vector_at", "vector_in", "where", "whole",
     "within",
-]
+]  # fmt: skip
 
 
 def vector_at(array, i, k):

@@ -106,10 +106,7 @@ def _named_values(function) -> list[tuple[str, Any]]:
 @lru_cache(maxsize=4096)  # scenes make functions of their own
 def _names_in(function) -> list[str]:
     """The names in a function and in those within it, sorted."""
-    codes = [function.__code__]
-    for code in codes:
-        codes += [c for c in code.co_consts if isinstance(c, types.CodeType)]
-    return sorted({name for code in codes for name in code.co_names})
+    return sorted({name for code in codes_in(function.__code__) for name in code.co_names})
 
 
 @cache
@@ -160,15 +157,13 @@ def identities(*functions) -> list[str | bytes]:
 def bytecode(function) -> tuple[str | bytes, ...]:
     """Instructions of a function and of those within it, with the names and constants in them."""
     parts: list[str | bytes] = []
-    codes = [function.__code__]
-    for code in codes:
+    for code in codes_in(function.__code__):
         parts += [code.co_code, repr(code.co_names)]
         for constant in code.co_consts:
-            if isinstance(constant, types.CodeType):
-                codes.append(constant)
-            else:  # the order of a set is another one in each process
-                parts.append(repr(sorted(map(repr, constant)) if isinstance(constant, frozenset)
-                                  else constant))  # fmt: skip
+            if isinstance(constant, frozenset):  # its order is another one in each process
+                parts.append(repr(sorted(map(repr, constant))))
+            elif not isinstance(constant, types.CodeType):
+                parts.append(repr(constant))
     return tuple(parts)
 
 

@@ -15,7 +15,7 @@ from dap3d_core.assembly.evaluate import place_state
 from dap3d_core.formulations import REPORT, RHS
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.compiler.derivatives import differentiate
-from dap3d_core.kernels.compiler.types import INT, CompileError
+from dap3d_core.kernels.compiler.types import INT
 from dap3d_core.kernels.compiler.units import Entry, Unit, type_of
 from dap3d_core.kernels.runtime.array_struct import Arrays, pointer
 from dap3d_core.kernels.runtime.cache import compiled
@@ -138,14 +138,6 @@ class Directions:
         tables = tables if self._reports or self.rates else []
         self._tables = list({id(table): table for table in tables}.values())
         prepared.more.append(self.arrays)
-
-    @classmethod
-    def of(cls, prepared: PreparedRun, outputs: Outputs) -> "Directions | None":
-        """Those of a model; None where a function has no derivative."""
-        try:
-            return cls(prepared, outputs)
-        except CompileError:
-            return None
 
     @property
     def entries(self) -> list[PairEntry]:

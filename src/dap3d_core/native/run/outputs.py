@@ -5,9 +5,9 @@ placed them, and the reported row.
 """
 
 import math
+import operator
 from collections.abc import Callable, Sequence
 from functools import partial
-from operator import add
 from typing import Any
 
 import attrs
@@ -245,7 +245,7 @@ class _Quantities:
                 if owner in self._model.brought_forces:
                     brought = self.elements.force(self._model.brought_forces[owner])
                     assert brought is not None  # as every force
-                    wrench = tuple(map(add, wrench, self._wrench(brought, slot)))
+                    wrench = tuple(map(operator.add, wrench, self._wrench(brought, slot)))
                 return self._action(element, slot, attribute, wrench)
             found = self._coordinate(owner, joint, attribute)
             if found is not None:
@@ -456,22 +456,13 @@ OF_CONTACT = {"gap": (GAP, 1), "normal": (NORMAL, 1), "friction": (FRICTION, 3),
 _OF_BODY = ("r", "p", "rd", "w", "wp", "rdd", "wd", "wpd")
 _OF_POINT = {"r": 0, "v": 1, "a": 2, "rP": 0, "rPd": 1, "rPdd": 2}
 _OPERATIONS: dict[str, Callable[..., Any]] = {
-    "+": lambda a, b: a + b,
-    "-": lambda a, b: a - b,
-    "*": lambda a, b: a * b,
-    "/": lambda a, b: a / b,
-    "%": scalar_math.mod,
-    "**": lambda a, b: a**b,
-    "neg": lambda a: -a,
-}
+    "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv,
+    "%": scalar_math.mod, "**": operator.pow, "neg": operator.neg,
+}  # fmt: skip
 _TRUTHS: dict[str, Callable[..., Any]] = {
-    "<": lambda a, b: a < b,
-    "<=": lambda a, b: a <= b,
-    ">": lambda a, b: a > b,
-    ">=": lambda a, b: a >= b,
-    "==": lambda a, b: a == b,
-    "!=": lambda a, b: a != b,
-}
+    "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge,
+    "==": operator.eq, "!=": operator.ne,
+}  # fmt: skip
 
 
 def _dot(a: Any, b: Any) -> Any:

@@ -20,11 +20,13 @@ from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import ModelError
+from dap3d_core.model.state_layout import y_from_u
 from dap3d_core.native.run.outputs import Outputs, outputs_of
 from dap3d_core.native.run.prepared import ContactCode, PreparedRun, refusal
 from dap3d_core.scene import SceneError
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.study.batch import initial_state
+from dap3d_core.study.batch.driver import MIN_PIVOT
 from dap3d_core.study.parameters import SceneParameter, with_values
 
 #: Factors on a parameter by which its places in the memory are found, and summands where it is 0:
@@ -198,14 +200,15 @@ def _is_assembled_alike(other: PreparedRun) -> bool:
     """True if compiled code brings the given start onto the constraints where Python does."""
     evaluator, start, y = other.evaluator, other.start, other.run.present.y
     assert start is not None
-    found, system = start.given_state(evaluator), evaluator.system
+    model, system = evaluator.model, evaluator.system
+    found = y_from_u(np.asarray(model.u0), states=model.initial_states)
     if start.assembles:
         arrays, kept = start.arrays, system.metric.copy()
         system.metric[1:, :7] = arrays.unit
         out: Floats = arrays.starting.copy()
         start.functions[1](0.0, found, out, system, evaluator.loops)
         system.metric[:] = kept
-        if out[initial_state.OPEN] or not out[initial_state.LEAST_PIVOT] > start.least_pivot:
+        if out[initial_state.OPEN] or not out[initial_state.LEAST_PIVOT] > MIN_PIVOT:
             return False
     size = max(1.0, float(np.abs(y).max(initial=0.0)))
     return bool(np.abs(found - y).max(initial=0.0) <= ALIKE * size)

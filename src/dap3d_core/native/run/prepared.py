@@ -2,7 +2,7 @@
 
 import os
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import attrs
 import numpy as np
@@ -22,7 +22,6 @@ from dap3d_core.kernels.compiler.types import FLOAT, INT, Array
 from dap3d_core.kernels.compiler.units import Entry, type_of
 from dap3d_core.kernels.runtime.array_struct import Arrays
 from dap3d_core.kernels.runtime.cache import jit_is_on
-from dap3d_core.model.state_layout import y_from_u
 from dap3d_core.native.run.image import Image
 from dap3d_core.registry import Registry
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
@@ -35,7 +34,6 @@ from dap3d_core.simulation.run_state import Callbacks, jumps_of
 from dap3d_core.simulation.settings import compiled_for, settings_of
 from dap3d_core.simulation.stepwise.stepped_run import HORIZON, OpenRun
 from dap3d_core.study.batch.compiled_batch import begin_functions, start_constants
-from dap3d_core.study.batch.driver import MIN_PIVOT
 from dap3d_core.study.batch.initial_state import begin_free
 
 #: Final time of an exported run where the scene has none, s.
@@ -197,7 +195,6 @@ class StartCode:
     functions: Any
     assembles: bool
     moves: bool
-    least_pivot: ClassVar[float] = MIN_PIVOT
 
     @classmethod
     def of(cls, evaluator: Evaluator, settings: Any) -> "StartCode | None":
@@ -219,12 +216,6 @@ class StartCode:
         # pivots beside contacts are not watched (formulations/pivots.py)
         found = step_functions(begin_free) if has_contacts else begin_functions(formulation)
         return cls(arrays, found, assembles, assembles or not is_corrected)
-
-    @staticmethod
-    def given_state(evaluator: Evaluator) -> Floats:
-        """The state that the scene gives."""
-        model = evaluator.model
-        return y_from_u(np.asarray(model.u0), states=model.initial_states)
 
 
 class PreparedRun:

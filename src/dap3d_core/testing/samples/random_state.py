@@ -40,17 +40,6 @@ class TimeFunction:
         )
 
 
-@attrs.frozen
-class HeldInput:
-    """An input: a number without derivatives."""
-
-    value: float
-
-    def at(self, t: float) -> tuple[float, ...]:
-        """(value, 0, 0, 0) at every time."""
-        return self.value, 0.0, 0.0, 0.0
-
-
 @attrs.frozen(eq=False)
 class Direction:
     """A direction: rates of position (m/s), rotation (rad/s, global) and time; row 0 is ground.
@@ -104,7 +93,7 @@ class State:
     w: Floats
     mass: Floats
     Jp: Floats
-    functions: tuple[TimeFunction | HeldInput | None, ...]
+    functions: tuple[TimeFunction | None, ...]
     own: Floats = attrs.field(factory=lambda: np.zeros(0))
     unknowns: Floats = attrs.field(factory=lambda: np.zeros((0, 2)))
 
@@ -218,5 +207,7 @@ def _random_bodies(rng: random.Random, count: int) -> tuple[Floats, ...]:
     return r, p, v, w, Jp, np.array([rng.uniform(0.5, 2.0) for _ in range(count)])
 
 
-def _row_of_time(rng: random.Random, which: bool | str) -> TimeFunction | HeldInput:
-    return HeldInput(*numbers(rng, 1)) if which == HELD else TimeFunction(numbers(rng, 5))
+def _row_of_time(rng: random.Random, which: bool | str) -> TimeFunction:
+    if which == HELD:
+        return TimeFunction((*numbers(rng, 1), 0.0, 0.0, 0.0, 0.0))
+    return TimeFunction(numbers(rng, 5))

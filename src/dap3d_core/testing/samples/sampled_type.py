@@ -316,40 +316,38 @@ def own_values(type_info: TypeInfo) -> dict[str, Any] | None:
     return None
 
 
-def position_jacobian(sample: Sample, state: State | None = None) -> Floats:
+def position_jacobian(sample: Sample) -> Floats:
     """dC/dq (position rows, slots, 6) by complex step, or by differences where that fails."""
-    here = sample if state is None else attrs.evolve(sample, state=state)
-    slots = len(here.kernels.type_info.layout.slots)
-    columns = [here.rate("C", Direction.of(slot, k)) for slot in range(slots) for k in range(6)]
+    slots = len(sample.kernels.type_info.layout.slots)
+    columns = [sample.rate("C", Direction.of(slot, k)) for slot in range(slots) for k in range(6)]
     return np.stack(columns, axis=-1).reshape(len(columns[0]), -1, 6)
 
 
-def gradient(sample: Sample, state: State | None = None) -> Floats:
+def gradient(sample: Sample) -> Floats:
     """(position rows, unknowns) dC/ds by complex step, or by differences where that fails."""
-    here = sample if state is None else attrs.evolve(sample, state=state)
-    type_: Any = here.kernels.type_info.type
-    count = len(here.state.unknowns)
-    columns = [here.rate("C", Direction.of_unknown(k, count)) for k in range(count)]
+    type_: Any = sample.kernels.type_info.type
+    count = len(sample.state.unknowns)
+    columns = [sample.rate("C", Direction.of_unknown(k, count)) for k in range(count)]
     return np.stack(columns, axis=1) if count else np.zeros((len(type_.position_rows()), 0))
 
 
-def gradient_of_rows(sample: Sample, state: State | None = None) -> Floats:
+def gradient_of_rows(sample: Sample) -> Floats:
     """(rows, unknowns) the same, with zeros in the rows of the velocity level."""
     type_: Any = sample.kernels.type_info.type
     whole = np.zeros((type_.rows, len(sample.state.unknowns)))
     if whole.size:
-        whole[list(type_.position_rows())] = gradient(sample, state)
+        whole[list(type_.position_rows())] = gradient(sample)
     return whole
 
 
 def assembled(sample: Sample) -> Sample | None:
     """The sample brought to C = 0 by Newton's method and to J v = nu; None where that fails."""
-    state, kernels, sizes = sample.state, sample.kernels, [math.inf] * STALLED
+    kernels, sizes = sample.kernels, [math.inf] * STALLED
     slots = len(kernels.type_info.layout.slots)
     free = [s for s in range(slots) if not (sample.grounded and s == 1)]
     try:
         for _ in range(NEWTON_STEPS if "C" in kernels.names() else 0):
-            C = sample.value("C", state)
+            C = sample.value("C")
             if not np.isfinite(C).all():
                 return None
             sizes.append(float(np.max(np.abs(C), initial=0.0)))
@@ -357,23 +355,22 @@ def assembled(sample: Sample) -> Sample | None:
                 break
             if sizes[-1] > 0.5 * sizes[-1 - STALLED]:
                 return None
-            C_q = position_jacobian(sample, state)[:, free].reshape(len(C), -1)
-            G = gradient(sample, state)
-            step = -np.linalg.lstsq(np.hstack([C_q, G]), C, rcond=1e-10)[0]
+            C_q = position_jacobian(sample)[:, free].reshape(len(C), -1)
+            step = -np.linalg.lstsq(np.hstack([C_q, gradient(sample)]), C, rcond=1e-10)[0]
             step *= min(1.0, 0.7 / max(float(np.max(np.abs(step))), 1e-300))
             bodies, unknowns = np.split(step, [C_q.shape[1]])
             whole = np.zeros((BODIES, 6))
             whole[1 + np.array(free)] = bodies.reshape(-1, 6)
             along = Direction(whole[:, :3], whole[:, 3:], unknowns=tuple(unknowns.tolist()))
-            state = state.moved(along, 1.0)
+            sample = attrs.evolve(sample, state=sample.state.moved(along, 1.0))
         else:
             if "C" in kernels.names():
                 return None
-        J = sample.value("J", state)
-        nu = sample.value("nu", state) if "nu" in kernels.names() else np.zeros(J.shape[1])
-        x = np.hstack([state.v, state.w])[1 : slots + 1]
+        J, state = sample.value("J"), sample.state
+        nu = sample.value("nu") if "nu" in kernels.names() else np.zeros(J.shape[1])
+        x = state.velocities(slots)
         flat = J[free].transpose(1, 0, 2).reshape(J.shape[1], -1)
-        flat, count = np.hstack([flat, gradient_of_rows(sample, state)]), 6 * len(free)
+        flat, count = np.hstack([flat, gradient_of_rows(sample)]), 6 * len(free)
         v = np.concatenate([x[free].ravel(), state.unknowns[:, 1]])
         off = flat @ v - nu
         if not np.isfinite(off).all():  # LAPACK would say so on stderr, in words of its own

@@ -37,14 +37,12 @@ def differentiate(text: str, count: int) -> str:
     Raises:
         CompileError: it calls a function without a derivative.
     """
+    declared = set(re.findall(r"^declare double @(\w[\w.]*)\(", text, re.MULTILINE))
     if count in FILLING:
-        lanes = count
         lines = list(rewritten(text, lambda external: WithinWriter(count, external)))
     else:
-        lanes = count - 1
-        lines = list(_beside(text, lanes))
+        lines = list(_beside(text, count - 1, declared))
     called = set(re.findall(r"call double @(\w[\w.]*)\(", "\n".join(lines)))
-    declared = set(re.findall(r"^declare double @(\w[\w.]*)\(", text, re.MULTILINE))
     for function in sorted(called - declared):
         takes = "double, double" if function == "pow" else "double"
         kind = "" if function.startswith("llvm.") else PURE
@@ -53,9 +51,8 @@ def differentiate(text: str, count: int) -> str:
     return _DEFINED.sub(r'\1 "frame-pointer"="all"\2', "\n".join([*lines, ""]))
 
 
-def _beside(text: str, lanes: int) -> Iterator[str]:
-    """The lines of a module with slopes beside values."""
-    external = set(re.findall(r"^declare double @(\w[\w.]*)\(", text, re.MULTILINE))
+def _beside(text: str, lanes: int, external: set[str]) -> Iterator[str]:
+    """The lines of a module with slopes beside values; external: as of ``Instructions``."""
     for part in re.split(r"^(?=define )", text, flags=re.MULTILINE):
         lines = part.splitlines()
         writer = BesideWriter(lanes, external, lines)

@@ -1,12 +1,9 @@
 """Instructions that slopes are computed by, and derivatives of functions of numbers."""
 
-import re
 from collections.abc import Callable, Sequence
 
 from dap3d_core.kernels.compiler.types import CompileError, bits
 
-DOUBLE = re.compile(r"(?<![\w.%@])double(?![\w.])")
-RESULT = re.compile(r"  (%[\w.]+) = (.*)")
 ZERO, ONE = bits(0.0), bits(1.0)
 #: Of functions that derivatives call.
 PURE = " nobuiltin nounwind willreturn memory(none)"

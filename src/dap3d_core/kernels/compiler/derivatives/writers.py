@@ -9,15 +9,8 @@ branches. An item of an array is such a vector.
 
 import re
 
-from dap3d_core.kernels.compiler.derivatives.instructions import (
-    DOUBLE,
-    ONE,
-    RESULT,
-    ZERO,
-    Instructions,
-    layout,
-)
-from dap3d_core.kernels.compiler.lanes import CALL, NUMBER, VectorWriter
+from dap3d_core.kernels.compiler.derivatives.instructions import ONE, ZERO, Instructions, layout
+from dap3d_core.kernels.compiler.lanes import CALL, DOUBLE, NUMBER, RESULT, VectorWriter
 from dap3d_core.kernels.compiler.types import CompileError
 from dap3d_core.kernels.compiler.writer import COUNT, SLOPE, SLOPES, VALUES
 
