@@ -118,7 +118,7 @@ def outputs_of(given: Any) -> tuple[Output, ...]:
         raise SceneError([Mistake("outputs", given, FORM)])
     pairs = [(plain(label), plain(of)) for label, of in pairs]
     if not pairs:
-        raise SceneError([Mistake("outputs", MISSING, f"a study needs at least one; {FORM}")])
+        raise SceneError([Mistake("outputs", MISSING, f"name at least one output; {FORM}")])
     read = [_output(label, of) for label, of in pairs]
     outputs = [one for one in read if isinstance(one, Output)]
     mistakes = [one for one in read if isinstance(one, Mistake)]

@@ -313,7 +313,8 @@ def _parse(text: str, path: Path) -> dict[str, Any]:
         what = f"{what} at line {line}, column {place[2]}"
         if what.startswith(_TWICE):
             what = _twice(canonical(text), line) or what
-        remedy = _remedy(text.splitlines()[line - 1], int(place[2]) - 1)
+        if "'='" not in words:  # which says all where there is none
+            remedy = _remedy(text.splitlines()[line - 1], int(place[2]) - 1)
     elif long := _LONG_NUMBER.search(text):
         line = text.count("\n", 0, long.end()) + 1
         what = "a number of thousands of digits"
