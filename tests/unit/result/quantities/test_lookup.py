@@ -247,3 +247,10 @@ def test_columns_are_names_of_quantities():
     by_mass = {"bodies.box.mass": [1.0, 2.0]}
     kept = dap.sweep(scene, by_mass, outputs="floor.normal:max", t_end=0.01)
     np.testing.assert_allclose(kept["floor#1.normal:max"], [9.81 / 4, 2 * 9.81 / 4])
+
+
+def test_an_expression_is_told_to_be_an_output_first(result):
+    with pytest.raises(UnknownNameError, match=r"declare it in \[outputs\]"):
+        find(result, "bob.r.z - 0.5 * norm(bob.rd)")
+    with pytest.raises(UnknownNameError, match="no body, point, joint"):
+        find(result, "my-bob.r.z")
