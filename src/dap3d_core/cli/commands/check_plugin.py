@@ -150,7 +150,7 @@ def _types_of(registry: "Registry", name: str) -> Iterator[tuple[str, str]]:
         from dap3d_core.cli.framework.error_messages import type_hint
 
         if Path(name).is_dir():
-            hint = f"install that folder, pip install -e {name}, and name its package, or name a file"
+            hint = f"pip install -e {name}, and name the package, or name a file"
         else:
             hint = "dap3d plugins lists them"
         raise Refused(

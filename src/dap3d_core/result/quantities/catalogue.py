@@ -57,7 +57,7 @@ class Quantity(NamedTuple):
     @property
     def columns(self) -> tuple[str, ...]:
         """Name of each column, a quantity too: ``crank.r.x``, of points ``floor#1.gap``."""
-        owner, _, attribute = self.name.rpartition(".")
+        attribute = self.name.rpartition(".")[2]
         if self.owner == "contact" and self.components != AXES:
             return tuple(f"{point}.{attribute}" for point in self.components) or (self.name,)
         return tuple(f"{self.name}.{c}" for c in self.components) or (self.name,)

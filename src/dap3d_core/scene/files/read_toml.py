@@ -345,7 +345,10 @@ _HABITS = (
     (r"(?i)[+-]?(nan|inf|infinity)", "a scene has finite numbers alone"),
     (r"(True|False|TRUE|FALSE)", "write true or false"),
     (r"[+-]?[\d.]+([ ;]+[+-]?[\d.]+)+", "write commas between the items of a list"),
-    (r"[\d.+-]+ *(?!e)[a-zA-Z/*^°%].*", 'write numbers alone, in SI units, or an angle as "30 deg"'),
+    (
+        r"[\d.+-]+ *(?!e)[a-zA-Z/*^°%].*",
+        'write numbers alone, in SI units, or an angle as "30 deg"',
+    ),
     (r"\(.*", "write a list in square brackets"),
     (r"[^\W\d][\w .-]*", "write text in quotes, and names with spaces or accents"),
 )

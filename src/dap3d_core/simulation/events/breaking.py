@@ -70,7 +70,10 @@ class JointEvents:
             )
             for joint, condition in model.active.items()
         ]
-        self.events: tuple[Event, ...] = (*overloads, *(Event(of, name=of.joint) for of in activities))
+        self.events: tuple[Event, ...] = (
+            *overloads,
+            *(Event(of, name=of.joint) for of in activities),
+        )
         self._broken: set[str] = set()
         self._latest: deque[tuple[float, str]] = deque(maxlen=MOST_CHANGES)
 

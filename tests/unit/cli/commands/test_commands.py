@@ -110,7 +110,7 @@ REFUSED = [
     (("response", "fall.toml", "--input", "a"), "Missing option '--output'"),
     (("check-plugin", "."), "pip install -e .,"),
     (("import", "fall.toml"), "dap3d run fall.toml"),
-    (("response", "fall.toml", "--input", "wind", "--output", "stone.r.z"), "input, force or driver"),
+    (("response", "fall.toml", "--input", "a", "--output", "stone.r.z"), "input, force or driver"),
     # sensitivities
     (("sensitivities", "fall.toml"), "Missing option '--by'"),
     (("sensitivities", "fall.toml", "--by", "bodies.stone.mass", "-o", "x.docx"), ".nc"),

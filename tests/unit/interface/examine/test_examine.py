@@ -351,5 +351,5 @@ def test_a_function_of_kernels_that_is_not_imported_is_named_with_its_import():
     def wrench(r_P_i):
         return (cross(r_P_i, X), ZERO), (ZERO, ZERO)  # noqa: F821
 
-    with pytest.raises(PluginError, match="from dap3d_core.kernels import cross"):
+    with pytest.raises(PluginError, match=r"from dap3d_core\.kernels import cross"):
         examine(type_of(Force, wrench=wrench))

@@ -241,7 +241,8 @@ def test_columns_are_names_of_quantities():
         ("floor#2.slip", "floor#2.slip.x", 3),
     ]:
         quantity = find(result, name)
-        assert quantity.columns[0] == first and len(quantity.columns) == count
+        assert quantity.columns[0] == first
+        assert len(quantity.columns) == count
         for column, values in zip(quantity.columns, np.atleast_2d(quantity.values.T), strict=True):
             np.testing.assert_array_equal(find(result, column).values, values)
     by_mass = {"bodies.box.mass": [1.0, 2.0]}
