@@ -307,6 +307,8 @@ def _importer(source: SourceFiles, wanted: str | None) -> tuple[Importer, str]:
     if wanted is not None:
         return formats.load(wanted)(), wanted
     suffixes = [one.lower() for one in source.path.suffixes]
+    if suffixes[-1:] == [".toml"]:
+        raise FormatError("is a scene of dap3d", remedy=f"dap3d run {source.path}")
     loaded: dict[str, Importer] = {}
     fitting: dict[str, Importer] = {}
     named = [one[1:] for one in suffixes if one[1:] in formats.keywords]

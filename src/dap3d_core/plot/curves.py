@@ -223,7 +223,7 @@ def _quantities(
             raise
         raise UnknownNameError(f"{run}: {error}") from error
     if over.values.ndim > 1:
-        choices = ", ".join(f"{over.name}.{c}" for c in over.components)
+        choices = ", ".join(over.columns)
         raise ValueError(f"x = {over.name} has components; name one of {choices}")
     return over, quantities
 
@@ -237,7 +237,6 @@ def _curves(
     result: Result, over: Quantity, quantity: Quantity, number: int, run: str, *, alone: bool
 ) -> Iterable[Curve]:
     """The curves of a quantity of a run; ``alone`` in its panel, it has the name of its run."""
-    names = [f"{quantity.name}.{c}" for c in quantity.components] or [quantity.name]
     parts = smooth_parts(result)
     of_parts = [
         _points(part, over, quantity)
@@ -249,7 +248,7 @@ def _curves(
     instants = [start + k * _between(len(part.t))
                 for start, part in zip(starts, parts, strict=True)
                 for k in range(len(part.t))]  # fmt: skip
-    for name, *points in zip(names, *of_parts, strict=True):
+    for name, *points in zip(quantity.columns, *of_parts, strict=True):
         label = run if alone and run else ", ".join(part for part in (name, run) if part)
         drift, span = drift_of(result, quantity), span_of(result, quantity)
         yield Curve(label, _interrupted(points), quantity, number, instants, drift, span)

@@ -325,7 +325,7 @@ class EquilibriumPathPicture(style.Picture):
 
 def _panel(path: "EquilibriumPath", name: str) -> Panel:
     quantity = path.quantity(name)
-    names = tuple(f"{name}.{c}" for c in quantity.components) or ("",)
+    names = quantity.columns if quantity.components else ("",)
     values = quantity.values.reshape(len(path.values), -1)
     return Panel(values, names, quantity.label, quantity.unit)
 

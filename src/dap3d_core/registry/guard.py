@@ -128,7 +128,7 @@ def _remedy(source: Source) -> str:
         return ""
     name = source.distribution
     leaving = f"{BLOCK_VARIABLE}={name}:{source.keyword}"
-    return f". Repair, update or uninstall {name}, or leave it out with {leaving}"
+    return f"; repair, update or uninstall {name}, or leave it out with {leaving}"
 
 
 def _reason(error: BaseException) -> str:

@@ -39,6 +39,7 @@ def unknown(what: str, name: str, known: Collection[str]) -> UnknownNameError:
         message += f": the scene has no {what}"
     elif len(known) <= LISTED:
         several = f"{what[:-1]}ies" if what.endswith("y") else f"{what}s"
+        several = "known" if " or " in what else several
         message += f" ({several}: {', '.join(known)})"
     return UnknownNameError(message, nearest(name, known))
 

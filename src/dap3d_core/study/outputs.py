@@ -69,14 +69,19 @@ class Output:
             return np.empty(0) if self.reduction == "series" else np.nan
         return REDUCTIONS[self.reduction](result.quantity(self.of).values, result.t)
 
-    def components(self, names: Sequence[str]) -> "list[Output]":
-        """An output for each component of a vector: ``crank.r:max`` -> ``crank.r.x:max``, ..."""
-        if not names:
+    def columns(self, quantity: Quantity) -> "list[Output]":
+        """An output for each column of its quantity: ``crank.r:max`` -> ``crank.r.x:max``, ..."""
+        if not quantity.components:
             return [self]
         head, colon, tail = self.name.rpartition(":")
         head, colon, tail = (head, colon, tail) if colon else (self.name, "", "")
         return [
-            attrs.evolve(self, name=f"{head}.{c}{colon}{tail}", of=f"{self.of}.{c}") for c in names
+            attrs.evolve(
+                self,
+                name=f"{column if head == self.of else f'{head}.{c}'}{colon}{tail}",
+                of=column,
+            )
+            for c, column in zip(quantity.components, quantity.columns, strict=True)
         ]
 
     def _returned(self, function: Callable[[Result], Any], result: Result) -> float:
@@ -113,7 +118,7 @@ def outputs_of(given: Any) -> tuple[Output, ...]:
         raise SceneError([Mistake("outputs", given, FORM)])
     pairs = [(plain(label), plain(of)) for label, of in pairs]
     if not pairs:
-        raise SceneError([Mistake("outputs", MISSING, f"a study needs at least one; {FORM}")])
+        raise SceneError([Mistake("outputs", MISSING, f"name at least one output; {FORM}")])
     read = [_output(label, of) for label, of in pairs]
     outputs = [one for one in read if isinstance(one, Output)]
     mistakes = [one for one in read if isinstance(one, Mistake)]
@@ -250,7 +255,7 @@ class Reduction:
                 except (UnknownNameError, ResultError) as error:
                     mistakes.append(unknown_quantity("outputs", output.name, error))
                     continue
-                components = output.components(quantity.components)
+                components = output.columns(quantity)
                 label, unit = quantity.label, quantity.unit
                 of_rows = all(map(self._is_of_rows, _sources(probe, quantity)))
                 if quantity.owner == "output" and self._tables == set(TABLES):

@@ -75,7 +75,7 @@ def _series(result: Result, name: str) -> dict[str, Any]:
         "name": name,
         "label": quantity.label,
         "unit": quantity.unit,
-        "components": list(quantity.components),
+        "columns": list(quantity.columns),
         "values": pack(quantity.values, "<f8"),
         "rates": pack(find(result, quantity.rate).values, "<f8") if quantity.rate else None,
     }

@@ -181,7 +181,7 @@ def test_a_plugin_that_never_ends_loading_is_named_and_stops_no_other(install, l
     assert listing["push"].state == "broken"
     for words in ["not loaded after 0.3 s", f"{module}.py:", "DAP3D_BLOCK=dap3d-push:push"]:
         assert words in listing["push"].reason
-    assert "its package was not loaded after 0.3 s. " in listing["shove"].reason
+    assert "its package was not loaded after 0.3 s; " in listing["shove"].reason
     assert listing["pull"].state == listing["weight"].state == "ok"
 
 

@@ -149,9 +149,13 @@ def _types_of(registry: "Registry", name: str) -> Iterator[tuple[str, str]]:
     if not matched:
         from dap3d_core.cli.framework.error_messages import type_hint
 
+        if Path(name).is_dir():
+            hint = f"pip install -e {name}, and name the package, or name a file"
+        else:
+            hint = "dap3d plugins lists them"
         raise Refused(
             f"there is no type, distribution or module {name!r}{type_hint(name, list(known))} "
-            "(dap3d plugins lists them)"
+            f"({hint})"
         )
 
 

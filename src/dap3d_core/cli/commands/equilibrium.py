@@ -289,7 +289,6 @@ def _columns(path: "EquilibriumPath", name: str) -> list[tuple[str, Any]]:
     import numpy as np
 
     quantity = path.quantity(name)
-    labels = [f"{name}.{c}" for c in quantity.components] or [name]
     columns = quantity.values.reshape(len(path.values), -1).T
     rounded = [np.where(np.abs(x) > PRINTED_AS_ZERO * np.max(np.abs(x)), x, 0.0) for x in columns]
-    return list(zip(labels, rounded, strict=True))
+    return list(zip(quantity.columns, rounded, strict=True))

@@ -86,9 +86,9 @@ def _scalar(found: "Sensitivities", quantities: tuple[str, ...]) -> tuple[str, .
     """
     from dap3d_core.result import find
 
-    for quantity in quantities:
-        if components := find(found.result, quantity).components:
-            raise Refused(f"{quantity} is a vector; take {quantity}.{components[0]}")
+    for name in quantities:
+        if (quantity := find(found.result, name)).components:
+            raise Refused(f"{name} is a vector; take {quantity.columns[0]}")
     return quantities
 
 

@@ -26,7 +26,6 @@ from dap3d_core.model.state_layout import COORDINATES, VELOCITIES
 from dap3d_core.native.run.elements import Element, Elements
 from dap3d_core.native.run.prepared import PreparedRun, refusal
 from dap3d_core.result import Result, ResultError
-from dap3d_core.result.arrays import POINT
 from dap3d_core.result.errors import UnknownNameError
 from dap3d_core.result.quantities.catalogue import ACTIONS
 from dap3d_core.result.quantities.lookup import find
@@ -128,7 +127,7 @@ def outputs_of(prepared: PreparedRun, names: Sequence[str] | None) -> Outputs:
                 "name motions, quantities of joints, forces and contacts, energies, or expressions",
             ) from None
         parts = list(value) if isinstance(value, tuple) else [value]
-        for word, part in zip(_names_of(name, quantity.components), parts, strict=True):
+        for word, part in zip(quantity.columns, parts, strict=True):
             if word not in [output.name for output in found]:
                 found.append(Output(word, quantity.unit, quantity.label,
                                     quantities.is_of_state))  # fmt: skip
@@ -151,13 +150,6 @@ def _first_row(prepared: PreparedRun) -> Result:
     """The result of the start alone, for names, units and components."""
     y, text = prepared.run.present.work.state[Y], prepared.compiled.scene_text
     return instant_of(text, prepared.evaluator, 0.0, y)
-
-
-def _names_of(name: str, components: Sequence[str]) -> list[str]:
-    """Names of the numbers of a quantity; of a contact with several points those of the points."""
-    owner, _, attribute = name.rpartition(".")
-    of_points = [f"{one}.{attribute}" for one in components if one.startswith(owner + POINT)]
-    return of_points or [f"{name}.{one}" for one in components] or [name]
 
 
 class _Quantities:

@@ -78,7 +78,9 @@ def check_target(path: str | os.PathLike[str], force: bool = False) -> Path:
         mode = _mode_of(target)  # once: another process may create it meanwhile
         is_link = target.is_symlink()
         file = Path(os.path.realpath(target)) if is_link else target
-        if mode and stat.S_ISDIR(mode):
+        if os.fspath(path) == "-":
+            fault = "what is written is a file, not the standard output; name one"
+        elif mode and stat.S_ISDIR(mode):
             fault = "it is a folder; name a file in it"
         elif mode and not stat.S_ISREG(mode):
             fault = f"it is no regular file but {kind_of(mode)}"

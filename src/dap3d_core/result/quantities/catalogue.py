@@ -54,6 +54,14 @@ class Quantity(NamedTuple):
     operands: tuple[str, ...] = ()
     exact: bool = True
 
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Name of each column, a quantity too: ``crank.r.x``, of points ``floor#1.gap``."""
+        attribute = self.name.rpartition(".")[2]
+        if self.owner == "contact" and self.components != AXES:
+            return tuple(f"{point}.{attribute}" for point in self.components) or (self.name,)
+        return tuple(f"{self.name}.{c}" for c in self.components) or (self.name,)
+
 
 class QuantitySource(Protocol):
     """The part of a ``Result`` that quantities are computed from."""

@@ -163,10 +163,9 @@ def _of_joints(result: "Result") -> Iterator[TableColumn]:
 
 
 def _of_quantity(quantity: Quantity) -> Iterator[TableColumn]:
-    name, values, unit = quantity.name, quantity.values, quantity.unit
-    if values.ndim == 1:
-        return iter([TableColumn(name, unit, values)])
-    return _components(name, unit, values, quantity.components)
+    columns = np.atleast_2d(quantity.values.T)
+    for name, values in zip(quantity.columns, columns, strict=True):
+        yield TableColumn(name, quantity.unit, values)
 
 
 def _components(

@@ -238,6 +238,9 @@ def _parsed(
 
 def _unknown(result: QuantitySource, name: str) -> UnknownNameError:
     """The error for a name: its owner, its attribute or its component is wrong."""
+    if _is_expression(result, name):
+        remedy = "declare it in [outputs], scene.outputs[NAME] = EXPRESSION, and give its name"
+        return UnknownNameError(f"{name!r} is an expression and no name: {remedy}")
     parts = name.split(".")
     for size in (2, 1):  # an animation point has a dot in its name
         for owner in _owners(result, ".".join(parts[:size])):
@@ -268,6 +271,17 @@ def _unknown(result: QuantitySource, name: str) -> UnknownNameError:
     if near in result.summary.contacts:
         return UnknownNameError(fault, ".".join([near, *parts[size:]]))
     return UnknownNameError(fault, _suggestion(result, near, parts[size:]))
+
+
+def _is_expression(result: QuantitySource, text: str) -> bool:
+    """True of text that computes something from quantities that there are."""
+    from dap3d_core.scene.expressions.expression import Call, ExpressionError, parse_expression
+
+    try:
+        expression = parse_expression(text)
+        return isinstance(expression.root, Call) and all(find(result, n) for n in expression.names)
+    except (ExpressionError, UnknownNameError):
+        return False
 
 
 def _attributes(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]:

@@ -307,11 +307,14 @@ def _parse(text: str, path: Path) -> dict[str, Any]:
     place = re.search(r"\(at line (\d+), column (\d+)\)", words)
     what = re.sub(r"\s*\(at [^()]*\)$", "", words)
     line: int | None
+    remedy = ""
     if place is not None:
         line = int(place[1])
         what = f"{what} at line {line}, column {place[2]}"
         if what.startswith(_TWICE):
             what = _twice(canonical(text), line) or what
+        if "'='" not in words:  # which says all where there is none
+            remedy = _remedy(text.splitlines()[line - 1], int(place[2]) - 1)
     elif long := _LONG_NUMBER.search(text):
         line = text.count("\n", 0, long.end()) + 1
         what = "a number of thousands of digits"
@@ -319,7 +322,6 @@ def _parse(text: str, path: Path) -> dict[str, Any]:
         line = text.count("\n") + 1 if "end of document" in words else None
         what += " at the end of the file" if line else ""
     what = f"not valid TOML: {what}"
-    remedy = "" if line is None else _remedy(text.splitlines()[line - 1 : line])
     if path.suffix == ".m":
         remedy = "this is a MATLAB file; dap3d import-matlab FOLDER makes a scene of it"
     elif path.suffix in (".urdf", ".sdf", ".xml", ".xacro"):
@@ -342,17 +344,24 @@ _HABITS = (
     (r"[+-]?(\.\d+|\d+\.)([eE][+-]?\d+)?", "write digits on both sides of the decimal point"),
     (r"(?i)[+-]?(nan|inf|infinity)", "a scene has finite numbers alone"),
     (r"(True|False|TRUE|FALSE)", "write true or false"),
-    (r"[A-Za-z_][\w .-]*", "write text in quotes"),
+    (r"[+-]?[\d.]+([ ;]+[+-]?[\d.]+)+", "write commas between the items of a list"),
+    (
+        r"[\d.+-]+ *(?!e)[a-zA-Z/*^°%].*",
+        'write numbers alone, in SI units, or an angle as "30 deg"',
+    ),
+    (r"\(.*", "write a list in square brackets"),
+    (r"[^\W\d][\w .-]*", "write text in quotes, and names with spaces or accents"),
 )
+_DELIMITERS = re.compile(r"[][{},=#]")
 
 
-def _remedy(lines: list[str]) -> str:
-    """The remedy for a line with an invalid value, where it is one of ``_HABITS``."""
-    for line in lines:
-        value = line.partition("=")[2].partition("#")[0].strip()
-        for habit, remedy in _HABITS:
-            if value and re.fullmatch(habit, value):
-                return remedy
+def _remedy(line: str, column: int) -> str:
+    """The remedy for an invalid value, where it or the item at the column is one of ``_HABITS``."""
+    value = line.partition("=")[2].partition("#")[0]
+    item = _DELIMITERS.split(line[:column])[-1] + _DELIMITERS.split(line[column:])[0]
+    for habit, remedy in _HABITS:
+        if any(re.fullmatch(habit, text.strip()) for text in (value, item)):
+            return remedy
     return ""
 
 

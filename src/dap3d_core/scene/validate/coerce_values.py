@@ -57,8 +57,10 @@ def _number_fault(value: Any) -> Fault:
         remedy, is_short = "", len(written) <= LONGEST_NUMBER
         if is_short and _NUMBER.fullmatch(written):
             remedy = f"write {written} without quotes"
-        elif is_short and _NUMBER.match(written):
+        elif is_short and (number := _NUMBER.match(written)):
             remedy = "write a number without its unit, in SI units"
+            if (unit := written[number.end() :].strip()) in ("deg", "rpm", "mm"):
+                remedy += f', or "= {number[0]} * {unit}" in a scene with [parameters]'
         return Fault(f"{should}, not text", remedy)
     if type(value) is bool:
         return Fault(f"{should}, not a truth value")

@@ -32,10 +32,15 @@ class Overload:
 
 @attrs.frozen
 class Activity:
-    """What an event watches of a joint that holds at times: a number, positive while it does."""
+    """What an event watches of a joint that holds at times: a number, positive while it does.
+
+    Attributes:
+        is_of_inputs: True where it is a function of inputs alone, which change between steps.
+    """
 
     joint: str
     margin: Expression
+    is_of_inputs: bool
 
     def __call__(self, t: float, instant: Instant) -> float:
         """The number at an instant."""
@@ -57,10 +62,18 @@ class JointEvents:
             for joint, limit in model.breaks.items()
             if np.isfinite(limit)
         ]
-        self.events: tuple[Event, ...] = (*overloads, *(
-            Event(Activity(joint, attrs.evolve(condition, root=margin(condition.root))), name=joint)
+        activities = [
+            Activity(
+                joint,
+                attrs.evolve(condition, root=margin(condition.root)),
+                set(condition.names) <= set(model.input_names),
+            )
             for joint, condition in model.active.items()
-        ))  # fmt: skip
+        ]
+        self.events: tuple[Event, ...] = (
+            *overloads,
+            *(Event(of, name=of.joint) for of in activities),
+        )
         self._broken: set[str] = set()
         self._latest: deque[tuple[float, str]] = deque(maxlen=MOST_CHANGES)
 

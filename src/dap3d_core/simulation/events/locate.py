@@ -324,7 +324,9 @@ class EventLocator:
             return found
 
         return [
-            sampler.samples(partial(value, event), partial(exact, event), t, first, here.t)
+            iter(())
+            if getattr(event.of, "is_of_inputs", False)
+            else sampler.samples(partial(value, event), partial(exact, event), t, first, here.t)
             for event, sampler, first in zip(self.events, self._samplers, self._values, strict=True)
         ]
 

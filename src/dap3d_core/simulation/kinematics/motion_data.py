@@ -290,7 +290,7 @@ class _Fit:
         except UnknownNameError as error:
             raise SceneError([Mistake(f"motion.{label}", MISSING, str(error))]) from error
         if quantity.values.ndim > 1:
-            words = f"name one of its components: {', '.join(quantity.components)}"
+            words = f"name one of its components: {', '.join(quantity.columns)}"
             raise SceneError([Mistake(f"motion.{label}", MISSING, words)])
         self._units[label] = quantity.unit
         return quantity.values

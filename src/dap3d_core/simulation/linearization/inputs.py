@@ -330,8 +330,8 @@ def _values(
     for k, name in enumerate(names):
         quantity = find(result, name)
         if quantity.values.ndim > 1:
-            first = quantity.components[0] if quantity.components else "1"
-            raise UnknownNameError(f"output {name!r} has components: name one, as {name}.{first}")
+            first = quantity.columns[0]
+            raise UnknownNameError(f"output {name!r} has components: name one, as {first}")
         if factor := _factor_in(point.model, result, name, factors):
             raise UnknownNameError(
                 f"output {name!r} depends on {factor} itself, a factor of which is an input; "

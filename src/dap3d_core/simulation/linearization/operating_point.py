@@ -130,7 +130,8 @@ def operating_point(
         frames = attrs.evolve(frames, is_steady=False)
         notes.append(
             "the state is neither at rest nor in steady motion: the matrices hold at this instant "
-            "alone, and the eigenvalues say nothing about stability"
+            "alone, and the eigenvalues say nothing about stability; `dap3d equilibrium MODEL -o "
+            "rest.toml`, `dap.equilibrium`, find a state at rest"
         )
     elif np.any(frames.Omega):
         largest = frames.Omega[np.argmax(np.linalg.norm(frames.Omega, axis=1))]

@@ -130,7 +130,7 @@ class Objective:
         compiled = self._compiled(self._scene, allow_code)
         probe = probe_of(compiled.scene_text, compiled.evaluator)
         try:
-            components = find(probe, quantity).components
+            found = find(probe, quantity)
         except (UnknownNameError, ResultError) as error:
             if not any(sign in quantity for sign in "+-*/( "):
                 raise SceneError([unknown_quantity("of", of, error)]) from None
@@ -139,14 +139,13 @@ class Objective:
                 name += "_"
             self._scene.outputs[name] = quantity
             compiled = self._compiled(self._scene, allow_code)
-            components = find(probe_of(compiled.scene_text, compiled.evaluator), name).components
-            if components:
+            if find(probe_of(compiled.scene_text, compiled.evaluator), name).components:
                 what = "this is a vector; take its norm, or a component of what it is made of"
                 raise SceneError([Mistake("of", of, what)]) from None
             return name
-        if components:
+        if found.components:
             what = "this is a vector; name a component"
-            raise SceneError([Mistake("of", of, what, f"{quantity}.{components[0]}")])
+            raise SceneError([Mistake("of", of, what, found.columns[0])])
         return quantity
 
 

@@ -147,9 +147,10 @@ class Sensitivities:
         Raises:
             ResultError: the quantity is a vector. Others as ``of``.
         """
-        if components := find(self.result, quantity).components:
-            raise ResultError(f"{quantity} is a vector; take {quantity}.{components[0]}")
-        value = float(self.result.quantity(quantity).values[-1])
+        found = find(self.result, quantity)
+        if found.components:
+            raise ResultError(f"{quantity} is a vector; take {found.columns[0]}")
+        value = float(found.values[-1])
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(self.final(quantity) * self.values / value)
 

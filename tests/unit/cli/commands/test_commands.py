@@ -108,13 +108,16 @@ REFUSED = [
     (("inverse", "pne1"), "Missing argument 'MOTION'"),
     (("modes", "fall.toml", "-n", "0"), "is not in the range x>=1"),
     (("response", "fall.toml", "--input", "a"), "Missing option '--output'"),
+    (("check-plugin", "."), "pip install -e .,"),
+    (("import", "fall.toml"), "dap3d run fall.toml"),
+    (("response", "fall.toml", "--input", "a", "--output", "stone.r.z"), "input, force or driver"),
     # sensitivities
     (("sensitivities", "fall.toml"), "Missing option '--by'"),
     (("sensitivities", "fall.toml", "--by", "bodies.stone.mass", "-o", "x.docx"), ".nc"),
     # sweeps
     (("sweep",), "Missing argument 'MODEL'"),
     (SWEEP, "--vary: nothing varies"),
-    ((*SWEEP, *VARY), "--keep: a study needs at least one"),
+    ((*SWEEP, *VARY), "--keep: name at least one output"),
     ((*SWEEP, "--vary", "bodies.stone.mass", *KEEP), "what varies is NAME=FORM"),
     ((*SWEEP, "--vary", "bodies.stnoe.mass=1,2", *KEEP), "did you mean 'bodies.stone.mass'"),
     ((*SWEEP, *VARY, *KEEP, "--sample", "two"), "'two' is not a valid integer"),
@@ -229,7 +232,7 @@ REFUSED = [
     (("import", "arm.urdf", "--arg", "L=2"), "write NAME:=VALUE"),
     (("import", "arm.urdf", "--arg", "L:=2"), "takes no argument 'L'"),
     (("run", "arm.urdf"), "dap3d import arm.urdf"),
-    (("import", "words", "--format", "urfd"), "did you mean 'urdf'"),
+    (("import", "words", "--format", "urfd", "-o", "made"), "did you mean 'urdf'"),
     (("import-matlab", "nothing"), "there is no such folder"),
     (("import-matlab", "sub"), "there is no inBodies.m"),
 ]  # fmt: skip

@@ -345,3 +345,11 @@ def test_examination_is_the_same_each_time():
     first, second = examine(joint()), examine(joint())
     assert first.outputs == second.outputs
     assert first.names == second.names
+
+
+def test_a_function_of_kernels_that_is_not_imported_is_named_with_its_import():
+    def wrench(r_P_i):
+        return (cross(r_P_i, X), ZERO), (ZERO, ZERO)  # noqa: F821
+
+    with pytest.raises(PluginError, match=r"from dap3d_core\.kernels import cross"):
+        examine(type_of(Force, wrench=wrench))

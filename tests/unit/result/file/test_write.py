@@ -201,6 +201,7 @@ def test_places_that_cannot_be_written_are_refused_in_a_sentence(tmp_path):
         tmp_path / "file" / "run.nc": "there is no folder|Not a directory",
         tmp_path: "it is a folder",
         "/dev/null": "it is no regular file",
+        "-": "not the standard output",
         "a\0b": "null (byte|character)",
     }.items():
         with pytest.raises(ResultError, match=words):

@@ -225,3 +225,33 @@ def test_the_force_of_an_element_follows_its_state(with_states):
     """A force evaluated again at reported instants takes the states of these."""
     held, force = with_states.quantity("lag.held").values, with_states.force("lag").on["i"].force
     assert np.array_equal(force, held)
+
+
+def test_columns_are_names_of_quantities():
+    """Of vectors, of rows, and of contacts with several points; so a sweep can keep them."""
+    scene = dap.Scene(name="box")
+    scene.add_body("box", mass=1.0, Jp=(0.01, 0.01, 0.01), r=(0.0, 0.0, 0.05))
+    scene.add_force("weight", "gravity")
+    scene.add_contact("box_plane", "floor", body_i="box", size=(0.1, 0.1, 0.1), mu=0.5)
+    result = dap.simulate(scene, t_end=0.01)
+    for name, first, count in [
+        ("box.r", "box.r.x", 3),
+        ("box.r.z", "box.r.z", 1),
+        ("floor.normal", "floor#1.normal", 8),
+        ("floor#2.slip", "floor#2.slip.x", 3),
+    ]:
+        quantity = find(result, name)
+        assert quantity.columns[0] == first
+        assert len(quantity.columns) == count
+        for column, values in zip(quantity.columns, np.atleast_2d(quantity.values.T), strict=True):
+            np.testing.assert_array_equal(find(result, column).values, values)
+    by_mass = {"bodies.box.mass": [1.0, 2.0]}
+    kept = dap.sweep(scene, by_mass, outputs="floor.normal:max", t_end=0.01)
+    np.testing.assert_allclose(kept["floor#1.normal:max"], [9.81 / 4, 2 * 9.81 / 4])
+
+
+def test_an_expression_is_told_to_be_an_output_first(result):
+    with pytest.raises(UnknownNameError, match=r"declare it in \[outputs\]"):
+        find(result, "bob.r.z - 0.5 * norm(bob.rd)")
+    with pytest.raises(UnknownNameError, match="no body, point, joint"):
+        find(result, "my-bob.r.z")

@@ -130,6 +130,12 @@ BAD_CONTENT = {
     "old line ends": (TEXT.replace("\n", "\r").encode(), ["not valid TOML"]),
     "decimal comma": (b"[scene]\nx = 1,5\n", [":2:", "decimal point"]),
     "no digit": (b"[scene]\nx = .5\n", [":2:", "digits on both sides"]),
+    "no digit in a list": (b"[scene]\nx = [1., 2.5]\n", [":2:", "digits on both sides"]),
+    "no commas": (b"[scene]\nx = [1 -2.5 3]\n", [":2:", "commas between"]),
+    "semicolons": (b"[scene]\nx = [0, 1; 2, 3]\n", [":2:", "commas between"]),
+    "tuple": (b"[scene]\nx = (1, 2)\n", [":2:", "square brackets"]),
+    "unit": (b"[scene]\nx = 10 mm  # long\n", [":2:", "SI units"]),
+    "word in a list": (b"[scene]\nx = [true, False]\n", [":2:", "true or false"]),
     "NaN": (b"[scene]\nx = NaN\n", [":2:", "finite numbers"]),
     "program": (b"function inBodies\nsystem('rm -rf /tmp/x')\n", [":1:", "not valid TOML"]),
 }

@@ -11,6 +11,7 @@ from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.result import open_result
+from dap3d_core.simulation.events.breaking import Activity
 
 TIGHT = {"rtol": 1e-12, "atol": 1e-13}
 m, L, g, J = 2.0, 0.7, 9.81, 0.2
@@ -262,3 +263,30 @@ def test_only_joints_that_may_break_are_released(compiled):
     event = dap.Event("t", above=0.1, action=lambda state: state.release("hinge"))
     with pytest.raises(ValueError, match="'hinge' is no joint that may be released: there are rod"):
         dap.simulate(compiled, t_end=0.2, events=[event])
+
+
+@pytest.mark.parametrize("by", ["controller", "event"])
+def test_what_depends_on_inputs_alone_is_not_searched_for_within_steps(by, monkeypatch):
+    """An input changes between steps; a hundred evaluations in each step of 1 ms took minutes."""
+    calls = []
+    evaluate = Activity.__call__
+    monkeypatch.setattr(Activity, "__call__", lambda *given: calls.append(1) or evaluate(*given))
+    scene = dap.Scene(name="gearbox")
+    for name, inertia, rate in (("engine", 0.5, 8.0), ("load", 1.5, -2.0)):
+        scene.add_body(name, mass=1.0, Jp=(1.0, 1.0, inertia), w=(0.0, 0.0, rate))
+        axle = {"P_i": f"{name}.O", "P_j": "ground.O", "a_i": f"{name}.z", "a_j": "ground.z"}
+        scene.add_joint("rev", f"axle_{name}", **axle)
+    scene.add_input("pedal")
+    pair = {"body_i": "engine", "body_j": "load", "a_j": "load.z"}
+    scene.add_joint("rel-rot", "clutch", active="pedal > 0.5", **pair)
+    if by == "event":
+        action = dap.Event("t", above=0.4, action=lambda state: state.set("pedal", value=1.0))
+        given = {"events": [action]}
+    else:
+        pedal = dap.Controller(every=0.01, update=lambda t, state: {"pedal": float(t > 0.395)})
+        given = {"controllers": [pedal]}
+    result = dap.simulate(scene, t_end=1.0, dt=0.5, **given)
+    engaged = [event for event in result.events if event.kind == "engage"]
+    assert [event.t for event in engaged] == pytest.approx([0.4], abs=1e-14)
+    assert result.w[-1, :, 2] == pytest.approx([0.5, 0.5], abs=1e-12)
+    assert len(calls) < 3 * result.stats.steps + 10

@@ -63,7 +63,7 @@ class Plots {
   }
 
   #keys(panel) {
-    panel.curves = panel.quantities.flatMap((q) => q.values().map((values, k) => ({ q, values, ...this.slopes(q, k, values), name: q.parts.length ? `${q.name}.${q.parts[k]}` : q.name })));
+    panel.curves = panel.quantities.flatMap((q) => q.values().map((values, k) => ({ q, values, ...this.slopes(q, k, values), name: q.names[k] })));
     panel.keys.replaceChildren(...panel.curves.map((curve, k) => {
       curve.color = PALETTE[k % PALETTE.length];
       curve.dash = [[], [6, 3], [2, 2]][Math.floor(k / PALETTE.length) % 3];

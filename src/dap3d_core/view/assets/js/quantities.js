@@ -5,18 +5,18 @@ function catalogue(data, motion, arrows) {
   const add = (one) => { if (!found.has(one.name)) found.set(one.name, one); };
   for (const s of data.series) {
     add({ name: s.name, unit: s.unit, label: s.label, group: data.asked.includes(s.name) ? "Asked for" : "Energy",
-      parts: s.components, values: lazy(() => columns(float64(s.values), s.components.length || 1)),
-      rates: s.rates && lazy(() => columns(float64(s.rates), s.components.length || 1)) });
+      names: s.columns, values: lazy(() => columns(float64(s.values), s.columns.length)),
+      rates: s.rates && lazy(() => columns(float64(s.rates), s.columns.length)) });
   }
   data.bodies.forEach((body, k) => add({ name: `${body.name}.r`, unit: "m", label: `position of ${body.name}`, group: "Position of a body",
-    parts: ["x", "y", "z"], ...course(motion, k + 1, [0, 0, 0]) }));
+    names: axes(body.name), ...course(motion, k + 1, [0, 0, 0]) }));
   data.points.filter((p) => p.body > 0).forEach((p) => add({ name: `${p.name}.r`, unit: "m", label: `position of ${p.name}`, group: "Position of a point",
-    parts: ["x", "y", "z"], ...course(motion, p.body, p.at) }));
+    names: axes(p.name), ...course(motion, p.body, p.at) }));
   for (const group of Object.values(arrows.groups)) {
     for (const item of group.items) {
       const name = `${item.name}.${item.what}.norm`;
       add({ name, unit: group.unit, label: `${group.label.toLowerCase()} of ${item.name}`, group: group.label,
-        parts: [], values: lazy(() => [norms(item.values)]) });
+        names: [name], values: lazy(() => [norms(item.values)]) });
     }
   }
   return found;
@@ -27,6 +27,8 @@ function course(motion, body, at) {
   const values = lazy(() => columns(Float64Array.from(motion.path(body, at)), 3));
   return { values, rates: lazy(() => values().map((one) => one.map((_, n) => motion.slope(n).reduce((sum, [f, w]) => sum + w * one[f], 0)))) };
 }
+
+const axes = (owner) => ["x", "y", "z"].map((axis) => `${owner}.r.${axis}`);
 
 function lazy(compute) {
   let value;
