@@ -15,7 +15,7 @@ from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.model.state_layout import velocities_of
 from dap3d_core.result import EventRecord, information
-from dap3d_core.result.file.validate import are_events, is_number
+from dap3d_core.result.file.validate import are_events, check_forms, is_number
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.events.uncarried_contact import UncarriedContact
 
@@ -62,13 +62,11 @@ class Jumps:
         Raises:
             ValueError: it is not of that form.
         """
-        good = isinstance(stored, Mapping) and are_events(stored.get("records"))
-        if (
-            not good
-            or not is_number(stored.get("count"))
-            or stored.get("lose") not in (True, False)
-        ):
-            raise ValueError("what is known of its jumps is damaged")
+        check_forms(stored, {
+            "records": (are_events, "a list of jumps"),
+            "count": (is_number, "a number of jumps"),
+            "lose": (lambda value: isinstance(value, bool), "true or false"),
+        })  # fmt: skip
         self.records = [EventRecord(**one) for one in stored["records"]]
         self.count, self.lose = int(stored["count"]), stored["lose"]
 
