@@ -18,7 +18,6 @@ from dap3d_core.simulation.equilibrium.search import (
     Outcome,
     Search,
     Stability,
-    search_equilibrium,
     stability_of,
 )
 from dap3d_core.simulation.equilibrium.statics import (
@@ -27,6 +26,8 @@ from dap3d_core.simulation.equilibrium.statics import (
     SETTLED,
     StaticPose,
     Statics,
+    moving_states,
+    refuse_carried,
     unsettled_part,
 )
 from dap3d_core.simulation.errors import AssemblyError, SimulationError, refuse_collisions
@@ -88,9 +89,9 @@ def find_rest(
     evaluator.start(0.0, u, angles, states)
     if evaluator.model.contact_count:
         _hold_contacts(evaluator, u, "at the start of the search for an equilibrium")
-    search = search_equilibrium(evaluator, u)
+    search = Search(Statics(evaluator), u)
     if evaluator.model.state_count:
-        search = _with_states(evaluator, search, u)
+        _let_states_rest(evaluator, search, u)
     if search.outcome is not Outcome.BALANCED:
         raise SimulationError(failure(search, evaluator.model))
     statics, pose = Statics(evaluator), search.pose
@@ -194,25 +195,23 @@ def _with_brought(
     return multipliers, force
 
 
-def _with_states(evaluator: Evaluator, search: Search, u: Floats) -> Search:
-    """The search, its pose such that the states of elements are at rest as well.
+def _let_states_rest(evaluator: Evaluator, search: Search, u: Floats) -> None:
+    """Make the pose of a search from u one at which the states of elements are at rest as well.
 
     Raises:
         SimulationError: states do not come to rest, or keep the way there; names them.
     """
-    from dap3d_core.simulation.equilibrium.statics import moving_states, refuse_carried
-
     refuse_carried(evaluator, u, search.pose.u)
     moving = moving_states(evaluator, search.pose.u)
     if not moving:
-        return search
+        return
     statics = Statics(evaluator)
     statics.settles = False
     found = solve_coupled(statics, search.pose)
     if found is None:
         raise SimulationError(f"no equilibrium: the rate of {moving} vanishes neither for any "
                               "value of the state nor at another pose")  # fmt: skip
-    return attrs.evolve(search, pose=found, outcome=Outcome.BALANCED)
+    search.pose, search.outcome = found, Outcome.BALANCED
 
 
 def start_at_rest(evaluator: Evaluator, u: Floats) -> StartState:
@@ -248,8 +247,7 @@ def solve_coupled(statics: Statics, pose: StaticPose) -> StaticPose | None:
         step = _least_solution(matrix, -np.concatenate([pose.unbalanced, own.rates]))
         evaluator.states = evaluator.states + step[pose.free.shape[1] :]
         try:
-            moved = statics.moved(pose.u, pose.free @ step[: pose.free.shape[1]])
-            pose = statics.at(statics.closed(moved))
+            pose = statics.behind(pose.u, pose.free @ step[: pose.free.shape[1]])
         except (AssemblyError, np.linalg.LinAlgError):
             break
     evaluator.states = kept
