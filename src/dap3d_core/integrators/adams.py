@@ -476,7 +476,6 @@ class AdamsIntegration(Integration):
             "next_order": range(1 if found["first_stage_valid"] else 0, HIGHEST + 1),
             "last_order": range(HIGHEST + 1),
             "is_starting": (0, 1),
-            **dict.fromkeys(("equal_steps", "failure_count"), range(at.MOST_COUNTED)),
         }
 
     def state_within(self, t: float) -> Floats | None:
@@ -491,8 +490,3 @@ class AdamsIntegration(Integration):
         if self.work.first_stage_valid == 0:
             return None
         return self.work.differences[0].copy()
-
-    @property
-    def order(self) -> int:
-        """Order of the next step."""
-        return int(self.work.next_order)
