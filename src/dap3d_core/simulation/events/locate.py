@@ -120,7 +120,7 @@ class EventLocator:
         self.released.release(found["released"])
         system.smallest[:] = found["pivots"]
 
-    def restore(self, found: Mapping[str, Any]) -> None:
+    def restore(self, found: Any) -> None:
         """Go on from what ``state`` gave.
 
         Raises:
