@@ -59,7 +59,12 @@ def choose_method(model: Model, requested: str) -> tuple[str, str]:
             f"use {'lsq' if model.breaks else 'lsq, joint'} or auto"
         )
     if model.breaks:
-        return _method_of_breaks(model, requested)
+        if requested in ("auto", "lsq"):
+            return "lsq", "joints may break or hold at times"
+        raise SimulationError(
+            f"method {requested} does not fit: joint {next(iter(model.breaks))} may end "
+            "(breaks_at, active), and its rows are zero then; use lsq or auto"
+        )
     constrained = model.row_count > 0
     usual = next(f.name for f in FORMULATIONS.values() if f.needs_joints == constrained)
     if requested == "auto":
@@ -77,17 +82,6 @@ def method_note(method: str, reason: str, requested: str) -> Note:
     """The choice of a method: a warning where it is another one than was asked for."""
     text = f"method {method}: {reason}"
     return information(text) if requested in ("auto", method) else Note(text)
-
-
-def _method_of_breaks(model: Model, requested: str) -> tuple[str, str]:
-    """As ``choose_method``, of a model with joints that may be released."""
-    some_joint = next(iter(model.breaks))
-    if requested in ("auto", "lsq"):
-        return "lsq", "joints may break or hold at times"
-    raise SimulationError(
-        f"method {requested} does not fit: joint {some_joint} may end (breaks_at, active), and its "
-        "rows are zero then; use lsq or auto"
-    )
 
 
 def explain(

@@ -21,9 +21,9 @@ from dap3d_core.simulation.events.uncarried_contact import UncarriedContact
 
 #: Records of jumps that a result keeps.
 MOST_RECORDS = 1000
-#: Parts of the run: the time over which a rate is found by a difference; the time to zero of a
-#: switch below which it is on the side to which it goes; the same of a contact that has closed.
-DIFFERENCE, AT_ONCE, SOON = 1e-8, 1e-10, 1e-13
+#: Parts of the run: the time to zero of a switch below which it is on the side to which it goes;
+#: that of a contact that has closed.
+AT_ONCE, SOON = 1e-10, 1e-13
 #: What passes a stop by this part of the length of the scene has gone through it.
 PASSED = 1e-9
 #: Part of the exchanged energy above which work of jumps is no rounding.
@@ -269,11 +269,8 @@ class Jumps:
         """
         evaluator, work = self._evaluator, integration.work
         t, y = integration.t, integration.y
-        span = self._span_of(integration)
-        h = DIFFERENCE * span
-        slope, values = evaluator.slope(t, y), evaluator.switch_values(t, y)
-        later = evaluator.switch_values(t + h, y + h * slope)
-        rates = (later - values) / h
+        span, values = self._span_of(integration), evaluator.switch_values(t, y)
+        rates = self._contact.rates(t, y, span)
         at_once = np.abs(values) <= AT_ONCE * span * np.abs(rates)
         sides = np.where(at_once, np.sign(rates), jump.sides)
         work.switches[at.SIDE] = np.where(self._law.elements.is_jump, sides, 0.0)

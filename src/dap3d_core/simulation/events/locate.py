@@ -97,16 +97,12 @@ class EventLocator:
             "sides": self._sides,
             "samplers": [sampler.state() for sampler in self._samplers],
             "inputs": self.evaluator.inputs.tolist(),
-            **self._joints_state(),
-        }
-
-    def _joints_state(self) -> dict[str, Any]:
-        """Which joints hold no more, and why, as plain data."""
-        if self.released is None:
-            return {}
-        pivots = self.evaluator.system.smallest.tolist()
-        released = sorted(self.released.names)
-        return {"joints": {"released": released, "pivots": pivots, **self._of_joints.state()}}
+            **({} if self.released is None else {"joints": {
+                "released": sorted(self.released.names),
+                "pivots": self.evaluator.system.smallest.tolist(),
+                **self._of_joints.state(),
+            }}),
+        }  # fmt: skip
 
     def _restore_joints(self, found: Any) -> None:
         assert self.released is not None

@@ -57,7 +57,7 @@ class UncarriedContact:
             return []
         ahead = AHEAD * span
         later = y + ahead * self._evaluator.slope(t, y)
-        rates, rates_later = self._rates(t, y, span), self._rates(t, later, span)
+        rates, rates_later = self.rates(t, y, span), self.rates(t, later, span)
         candidates &= (sides < 0.0) | (rates <= 0.0)  # else it is on its way out
         closes = rates_later < -SWITCH_ROUNDING * size / (DIFFERENCE * span)
         stays = candidates & self.pushes & (closes | (sides < 0.0))
@@ -77,9 +77,10 @@ class UncarriedContact:
         finally:
             evaluator.states = states
         after = evaluator.coordinates.with_jump(y, jump.dv, states, 0.0)
-        return bool(self._rates(t, after, span)[k] >= STOPPED * rate)
+        return bool(self.rates(t, after, span)[k] >= STOPPED * rate)
 
-    def _rates(self, t: float, y: Floats, span: float) -> Floats:
+    def rates(self, t: float, y: Floats, span: float) -> Floats:
+        """(switches,) rates of the switches, by a difference over a part of the run."""
         evaluator, h = self._evaluator, DIFFERENCE * span
         later = evaluator.switch_values(t + h, y + h * evaluator.slope(t, y))
         return np.asarray((later - evaluator.switch_values(t, y)) / h)
