@@ -25,6 +25,7 @@ from dap3d_core.simulation.equilibrium.statics import (
     refuse_carried,
 )
 from dap3d_core.simulation.errors import AssemblyError, SimulationError
+from dap3d_core.simulation.initial.least_change import largest_move
 
 #: The first step, and the shortest, at which the path ends; at most so many are taken. Lengths are
 #: of the parameter, as a part of its range, and of the root mean square of displacements, as parts
@@ -294,8 +295,7 @@ class Continuation:
     def _next(self, a: PathPoint) -> PathPoint | None:
         """A point one step away, or at the next given value; None where the step is too long."""
         rate = float(a.tangent[-1])
-        rotations = (a.tangent[:-1] / self.family.measure).reshape(-1, 6)[:, 3:]
-        turn = float(np.max(np.linalg.norm(rotations, axis=1), initial=0.0))
+        _, turn = largest_move(a.tangent[:-1] / self.family.measure)
         length = min(self._step, MOST_TURN / turn if turn > 0.0 else np.inf)
         ahead = self.given[(self.given - a.s) * rate > 0.0]
         s = None

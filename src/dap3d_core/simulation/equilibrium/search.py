@@ -16,6 +16,7 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import at_rest
 from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics
 from dap3d_core.simulation.errors import AssemblyError
+from dap3d_core.simulation.initial.least_change import largest_move
 
 #: A stiffness below this part of the largest is none: rounding errors of K.
 NEUTRAL = 1e-11
@@ -232,8 +233,7 @@ class Search:
         pose = self.pose
         while True:
             step = trust_region_step(K, pose.unbalanced, pose.size, self.radius, leaves=leaves)
-            turn = np.linalg.norm((pose.free @ step.y).reshape(-1, 6)[:, 3:], axis=1)
-            largest = float(np.max(turn, initial=0.0))
+            _, largest = largest_move(pose.free @ step.y)
             if largest <= MOST_TURN:
                 return step
             self.radius = float(np.linalg.norm(step.y)) * 0.9 * MOST_TURN / largest

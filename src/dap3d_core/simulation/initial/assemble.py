@@ -27,6 +27,7 @@ from dap3d_core.simulation.initial.least_change import (
     displacement,
     displacements,
     finite_rows,
+    largest_move,
     least_change,
     quadratic_part,
     scaled_system,
@@ -249,8 +250,7 @@ def _leave(
 
 def _step_limit(change: Floats, size: float) -> float:
     """The part of a change (n, 6) that a pass makes."""
-    shift = float(np.max(np.linalg.norm(change[:, :3], axis=1)))
-    turn = float(np.max(np.linalg.norm(change[:, 3:], axis=1)))
+    shift, turn = largest_move(change)
     shift_limit = MOST_SHIFT * size / shift if shift else 1.0
     turn_limit = MOST_TURN / turn if turn else 1.0
     return min(1.0, shift_limit, turn_limit)

@@ -24,7 +24,7 @@ from dap3d_core.model import Model
 from dap3d_core.model.state_layout import coordinates_of, velocities_of
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial.assemble import FIT, correct_positions, fit_of, max_speed
-from dap3d_core.simulation.initial.least_change import displaced, finite_rows
+from dap3d_core.simulation.initial.least_change import displaced, finite_rows, largest_move
 
 #: From this part of the largest singular value on rows are held: the root of the regularisation of
 #: lsq, 1e-9 of a row's square.
@@ -94,11 +94,8 @@ def bindings(
 def _leads_away(evaluator: Evaluator, u: Floats, t: float, direction: Floats) -> bool:
     """True if the joints can be closed at another pose in this direction (6 n,)."""
     step = direction.reshape(-1, 6) * np.repeat([evaluator.model.length, 1.0], 3)
-    extent = max(
-        float(np.max(np.linalg.norm(step[:, :3], axis=1))) / (SHIFT * evaluator.model.size),
-        float(np.max(np.linalg.norm(step[:, 3:], axis=1))) / TURN,
-    )
-    moved = displaced(u, step / extent)
+    shift, turn = largest_move(step)
+    moved = displaced(u, step / max(shift / (SHIFT * evaluator.model.size), turn / TURN))
     try:
         closed, _ = correct_positions(evaluator, moved, t, NO_ROWS)
     except AssemblyError:

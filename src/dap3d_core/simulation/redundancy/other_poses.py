@@ -14,7 +14,12 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import coordinates_of
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial.assemble import correct_positions
-from dap3d_core.simulation.initial.least_change import displaced, finite_rows, least_change
+from dap3d_core.simulation.initial.least_change import (
+    displaced,
+    finite_rows,
+    largest_move,
+    least_change,
+)
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, rank_of
 
 #: Poses that are tried up to this many rows; beyond, the last number.
@@ -97,10 +102,10 @@ def _other_pose(evaluator: Evaluator, u: Floats, rng: "np.random.Generator") -> 
     wish[:, :3] *= size
     wish = wish.ravel()
     free = wish - least_change(evaluator, rows, rows.product(wish), 0.0, NONE)
-    free = free.reshape(n, 6)
     if np.linalg.norm(free) <= FREE * np.linalg.norm(wish):
         return None
-    extent = max(_largest(free[:, :3]) / (SHIFT * size), _largest(free[:, 3:]) / TURN)
+    shift, turn = largest_move(free)
+    extent = max(shift / (SHIFT * size), turn / TURN)
     for halving in range(HALVINGS + 1):
         step = free / (extent * 2.0**halving)
         try:
@@ -111,7 +116,3 @@ def _other_pose(evaluator: Evaluator, u: Floats, rng: "np.random.Generator") -> 
         if gone > ANOTHER * np.linalg.norm(coordinates_of(displaced(u, step) - u)):
             return other
     return None
-
-
-def _largest(vectors: Floats) -> float:
-    return float(np.max(np.linalg.norm(vectors, axis=1)))
