@@ -23,7 +23,7 @@ from dap3d_core.linear.rank import DENSE_ROWS
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import coordinates_of, velocities_of
 from dap3d_core.simulation.errors import AssemblyError
-from dap3d_core.simulation.initial.assemble import FIT, correct_positions, fit_of, max_speed
+from dap3d_core.simulation.initial.assemble import FIT, Assembly, fit_of, max_speed
 from dap3d_core.simulation.initial.least_change import displaced, finite_rows, largest_move
 
 #: From this part of the largest singular value on rows are held: the root of the regularisation of
@@ -45,7 +45,6 @@ NEARLY = 1e-2
 #: What is asked of a combination is nothing below this part of what is asked of its rows.
 NOTHING = 1e-6
 HALVINGS = 40
-NO_ROWS = np.zeros(0, dtype=np.int64)
 
 
 @attrs.frozen
@@ -97,7 +96,7 @@ def _leads_away(evaluator: Evaluator, u: Floats, t: float, direction: Floats) ->
     shift, turn = largest_move(step)
     moved = displaced(u, step / max(shift / (SHIFT * evaluator.model.size), turn / TURN))
     try:
-        closed, _ = correct_positions(evaluator, moved, t, NO_ROWS)
+        closed, _ = Assembly(evaluator, t).close(moved)
     except AssemblyError:
         return False
     gone, asked = coordinates_of(closed - u), coordinates_of(moved - u)
@@ -150,7 +149,7 @@ def _closed(evaluator: Evaluator, u: Floats, t: float, later: float) -> Floats |
     """The bodies at a later time, put together; None where they cannot be."""
     moved = displaced(u, (later - t) * velocities_of(u))
     try:
-        return correct_positions(evaluator, moved, later, NO_ROWS)[0]
+        return Assembly(evaluator, later).close(moved)[0]
     except AssemblyError:
         return None
 

@@ -13,7 +13,7 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import coordinates_of
 from dap3d_core.simulation.errors import AssemblyError
-from dap3d_core.simulation.initial.assemble import correct_positions
+from dap3d_core.simulation.initial.assemble import Assembly
 from dap3d_core.simulation.initial.least_change import (
     displaced,
     finite_rows,
@@ -109,7 +109,7 @@ def _other_pose(evaluator: Evaluator, u: Floats, rng: "np.random.Generator") -> 
     for halving in range(HALVINGS + 1):
         step = free / (extent * 2.0**halving)
         try:
-            other, _ = correct_positions(evaluator, displaced(u, step), 0.0, NONE)
+            other, _ = Assembly(evaluator).close(displaced(u, step))
         except AssemblyError:
             continue
         gone = np.linalg.norm(coordinates_of(other - u))
