@@ -95,8 +95,6 @@ def explain(
     """A text for people, one fact a line.
 
     Args:
-        checked: the scene.
-        evaluator: its model.
         method: the method, and why.
         joint_cost: estimate of the time by method joint, over that of the method, or None.
         u: (13 n,) where a run would start.

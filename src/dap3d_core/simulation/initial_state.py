@@ -49,7 +49,6 @@ def find_start(
     """The start of a run.
 
     Args:
-        evaluator: the model.
         correct: whether its initial conditions are brought onto the constraints.
         hold: names of bodies that the correction of positions leaves where they are.
         metric: "unit" or "mass", of ``correct_initial``.

@@ -77,7 +77,6 @@ def find_rest(
     """The equilibrium that a model comes to from a state u (13 n,) on the constraints.
 
     Args:
-        evaluator: the model.
         u: the state; its velocities are left out.
         angles: (angles,) from which turns are counted on; None where they begin at zero.
         states: (s,) states of elements to begin with; None for their initial values.
@@ -299,7 +298,6 @@ def assumptions(evaluator: Evaluator, start: Floats, rows: ConstraintRows) -> It
     """Notes on what statics leaves out.
 
     Args:
-        evaluator: the model.
         start: (13 n,) the state that the search began at.
         rows: of the constraints at the equilibrium.
     """
@@ -356,10 +354,8 @@ def failure(search: Search, model: Model) -> str:
 def describe_motion(model: Model, x: Floats) -> str:
     """Which bodies move most, and how the first of these does.
 
-    Args:
-        model: names of the bodies.
-        x: (n, 6) or (6 n,) displacement in parts of a length of the scene, and rotation vector, of
-            each body, global axes.
+    x: (n, 6) or (6 n,) displacement in parts of a length of the scene, and rotation vector, of
+        each body, global axes.
     """
     x = np.asarray(x).reshape(-1, 6)
     shift, turn = (np.linalg.norm(part, axis=1) for part in (x[:, :3], x[:, 3:]))

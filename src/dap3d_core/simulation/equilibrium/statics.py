@@ -88,7 +88,6 @@ class Statics:
     """
 
     def __init__(self, evaluator: Evaluator, t: float = 0.0) -> None:
-        """Args: the evaluator, the time."""
         self.evaluator, self.t = evaluator, t
         self._size_nearby = 0.0
         self.settles = True

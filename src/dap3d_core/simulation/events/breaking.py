@@ -51,7 +51,6 @@ class JointEvents:
     """
 
     def __init__(self, model: Model) -> None:
-        """Args: the model."""
         overloads = [
             Event(Overload(joint), above=limit, name=joint)
             for joint, limit in model.breaks.items()

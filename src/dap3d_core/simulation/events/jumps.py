@@ -41,7 +41,6 @@ class Jumps:
     """
 
     def __init__(self, evaluator: Evaluator) -> None:
-        """Args: the evaluator of the run."""
         self._evaluator = evaluator
         self.records: list[EventRecord] = []
         self.count, self.lose = 0, False
@@ -137,7 +136,6 @@ class Jumps:
         """Let an event set velocities and states; u (13 n,) after it, and the work of that, J.
 
         Args:
-            integration: of the run, whose state they change.
             bodies: number of a body, from 0 -> (6,) its r_dot and omega, global axes; NaN leaves a
                 component to the joints.
             states: first place of a state among all -> its numbers.

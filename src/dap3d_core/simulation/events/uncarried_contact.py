@@ -31,7 +31,6 @@ class UncarriedContact:
     """
 
     def __init__(self, evaluator: Evaluator, law: JumpLaw) -> None:
-        """Args: evaluator and law of jumps of a run."""
         self._evaluator, self._law = evaluator, law
         types: list[Any] = [switch.group.type_info for switch in evaluator.switches]
         bare = [info.type.kind == "joint" or "wrench" not in info.kernels for info in types]
@@ -44,7 +43,6 @@ class UncarriedContact:
         """Switches where contact stays at time t and integrated state y.
 
         Args:
-            t, y: time and state.
             sides: (switches,) +1 or -1, the side that each is on, or 0.
             span: s, of the run.
         """

@@ -117,9 +117,7 @@ def correct_initial(
     Rows without a position level do not take part in the position stage.
 
     Args:
-        evaluator: the model.
         u: (13 n,) the state as given.
-        t: time, s.
         hold: bodies, from 1, that the position stage leaves where they are.
         metric: "unit" or "mass", see the head of this file.
         tolerance: of the position residual, of 1 m.

@@ -86,9 +86,7 @@ Start = str | Result | tuple[Result, float | None] | HasNamedState | StartState
 def start_state(start: Any, model: Model, checked: ValidatedScene) -> StartState:
     """The state that a start means for a model whose bodies have the same names.
 
-    Args:
-        start: a result, a result and a time, an equilibrium, or a state of the model.
-        model, checked: what is to start.
+    start: a result, a result and a time, an equilibrium, or a state of the model.
 
     Raises:
         SceneError: it is nothing of these, a body is missing in it, the result is empty, or has no

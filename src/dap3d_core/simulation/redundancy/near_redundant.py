@@ -107,7 +107,6 @@ def find_contradiction(evaluator: Evaluator, t: float, y: Floats, rank: int) -> 
     """Message on joints that contradict each other from about time t on; "" if none do.
 
     Args:
-        evaluator: the model.
         t, y: time and integrated state of the last step.
         rank: that of the constraints at the start.
     """

@@ -74,7 +74,6 @@ def redundancy_elsewhere(evaluator: Evaluator, u: Floats, redundancy: Redundancy
     """Take the rank at other poses that the joints allow at t = 0; the same ones each time.
 
     Args:
-        evaluator: the model.
         u: (13 n,) an assembled state.
         redundancy: that of u.
     """
