@@ -101,7 +101,7 @@ class ResumedRun:
         announce: Callable[[str], None] | None = None,
     ) -> None:
         """Read a checkpoint, compile its model; arguments and errors as of ``resume``."""
-        self.path, self._announce = Path(path), announce
+        self.path = Path(path)
         self._found = read_checkpoint(self.path)
         header = self._found.header
         self.compiled = compile_again(
@@ -141,7 +141,7 @@ class ResumedRun:
 
         with self.compiled.borrow_evaluator():
             run = Run(self.compiled, self._settings(),
-                      Callbacks(announce=self._announce, progress=progress, watch=watch), events,
+                      Callbacks(progress=progress, watch=watch), events,
                       output=target, force=force or is_own, identity=header["run"],
                       estimate_error=bool(header["estimate_error"]),
                       start=self._start_state(), controllers=controllers)  # fmt: skip

@@ -201,12 +201,10 @@ class Callbacks:
     """Functions of the caller, or None.
 
     Attributes:
-        announce: called with the name of each kernel that has to be compiled.
         progress: called as progress(t, t_end) between chunks.
         watch: called between chunks with a ``RunProgress``.
     """
 
-    announce: Callable[[str], None] | None = None
     progress: Progress | None = None
     watch: Callable[[RunProgress], None] | None = None
 

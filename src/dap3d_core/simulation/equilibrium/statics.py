@@ -155,20 +155,14 @@ class Statics:
     def stiffness(self, pose: StaticPose) -> Floats:
         """(f, f) Z^T K Z with K = -d(F + D^T lambda)/dx, the stiffness of reactions included.
 
-        States that keep the way of a motion stay as they are, as they do in ``force``.
-
-        Raises:
-            SimulationError: forces or rows have no derivative there.
+        States that keep the way of a motion stay as they are, as they do in ``force``. Errors as of
+        ``fixed_tangent``.
         """
         tangent = with_settled(self.fixed_tangent(pose), self.evaluator, keeps_way=False)
         return self.reduced(tangent.stiffness, pose)
 
     def tangent(self, pose: StaticPose) -> TangentMatrices:
-        """The equations of motion and their derivatives at a pose, at rest, states settled.
-
-        Raises:
-            SimulationError: forces or rows have no derivative there.
-        """
+        """The equations of motion and their derivatives at a pose, at rest, states settled."""
         return with_settled(self.fixed_tangent(pose), self.evaluator)
 
     def _settle(self, u: Floats) -> None:

@@ -279,7 +279,7 @@ def start(
     end = HORIZON if t_end is None else t_end
     simulation = settings_of(compiled, t_end=end, dt=end, **settings)
     with compiled.borrow_evaluator():
-        run = Run(compiled, simulation, Callbacks(announce=announce))
+        run = Run(compiled, simulation, Callbacks())
         run.reports = False  # how often states are looked at is not known
         run.notes += replaced_notes(compiled, simulation, settings)
         return SteppedRun(run, record=record)
