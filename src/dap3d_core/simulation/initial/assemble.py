@@ -110,7 +110,7 @@ def correct_initial(
     t: float = 0.0,
     hold: Collection[int] = (),
     metric: str = "unit",
-    tolerance: float = TOLERANCE,
+    tolerance: float | None = None,
 ) -> Initial:
     """Correct positions by Newton's method, velocities by a linear step, each by the least change.
 
@@ -120,7 +120,7 @@ def correct_initial(
         u: (13 n,) the state as given.
         hold: bodies, from 1, that the position stage leaves where they are.
         metric: "unit" or "mass", see the head of this file.
-        tolerance: of the position residual, of 1 m.
+        tolerance: of the position residual, of 1 m; TOLERANCE by default.
 
     Raises:
         AssemblyError: the position residual does not vanish; the message has that of each joint.
@@ -199,12 +199,12 @@ class Assembly:
         t: float = 0.0,
         hold: Collection[int] = (),
         metric: str = "unit",
-        tolerance: float = TOLERANCE,
+        tolerance: float | None = None,
     ) -> None:
         """Args: as of ``correct_initial``."""
         self.evaluator, self.t, self.metric = evaluator, t, metric
         self.held = np.array(sorted(hold), dtype=np.int64)
-        self.closed = evaluator.model.length * tolerance
+        self.closed = evaluator.model.length * (TOLERANCE if tolerance is None else tolerance)
 
     def close(self, u: Floats, leaves: int = 0) -> tuple[Floats, int]:
         """The state with other r and p, and the passes.
