@@ -144,7 +144,7 @@ def test_order_of_the_multipliers_of_the_stages():
         )  # fmt: skip
         while run.advance(10**9) is Status.RUNNING:
             pass
-        mu, lam = run.multipliers
+        mu, lam = run.work.last_multipliers[run.work.last_stages - 1, :, evaluator.system.row].T
         errors.append(abs(-lam[0] - A01[1.0][4]))
         held.append(abs(mu[0]))
     assert order_of(np.array(errors)) == pytest.approx(3.0, abs=0.4)

@@ -23,17 +23,23 @@ def explicit(
     method: Tableau, evaluator: Evaluator, y0: Any, times: Any, **options: Any
 ) -> Integration:
     """An integration by an explicit Runge-Kutta method."""
-    functions, system, loops = evaluator.functions, evaluator.system, evaluator.loops
-    options |= _placed_steps(evaluator)
-    return RungeKutta(method, functions, system, loops, y0, times, **options)
+    return _of_functions(partial(RungeKutta, method), evaluator, y0, times, **options)
 
 
 def _adams(evaluator: Evaluator, y0: Any, times: Any, **options: Any) -> Integration:
     from dap3d_core.integrators.adams import AdamsIntegration
 
-    functions, system, loops = evaluator.functions, evaluator.system, evaluator.loops
-    options |= _placed_steps(evaluator)
-    return AdamsIntegration(functions, system, loops, y0, times, **options)
+    return _of_functions(AdamsIntegration, evaluator, y0, times, **options)
+
+
+def _of_functions(
+    make: Callable[..., Integration], evaluator: Evaluator, y0: Any, times: Any, **options: Any
+) -> Integration:
+    """An integration that knows the functions of an evaluator, and no mechanics."""
+    return make(
+        evaluator.functions, evaluator.system, evaluator.loops, y0, times,
+        length_count=evaluator.length_count, watched=evaluator.watched, **options,
+    )  # fmt: skip
 
 
 def _radau(evaluator: Evaluator, y0: Any, times: Any, **options: Any) -> Integration:
@@ -50,11 +56,6 @@ def _moreau(evaluator: Evaluator, y0: Any, times: Any, **options: Any) -> Integr
     from dap3d_core.integrators.moreau.integration import MoreauIntegration
 
     return MoreauIntegration(evaluator, y0, times, **options)
-
-
-def _placed_steps(evaluator: Evaluator) -> dict[str, Any]:
-    """Options of explicit integrators for singular poses and the counting of turns."""
-    return {"length_count": evaluator.length_count, "watched": evaluator.watched}
 
 
 @attrs.frozen

@@ -263,9 +263,7 @@ def step(work: AdamsState, functions: Any, system: Any, loops: Any) -> None:
         begin(work, rhs, system, loops)
         if work.status != at.RUNNING:
             return
-    t, t_end, k = work.t, work.times[-1], work.next_order
-    h = with_slopes(min(work.h, work.longest_step), 0.0)  # chosen: not to be differentiated
-    end = t_end if t + step_control.STRETCH * h >= t_end else t + h
+    t, k, end = work.t, work.next_order, step_control.end_of_step(work)
     t1 = min(end, work.step_limit)
     h = t1 - t
     if work.switch_count != 0:
@@ -414,11 +412,8 @@ def plan(work: AdamsState, h: float, k: int, here: float, below: float, lower: b
 @compiled
 def reject(work: AdamsState, t1: float, h: float, order: int, factor: float, cause: int) -> None:
     """Try a shorter step again, of another order perhaps; at the floor, stop for ``cause``."""
-    work.rejected_count += 1
     work.is_starting, work.equal_steps, work.next_order = 0, 0, order
-    work.h = h * factor
-    if work.h < step_control.step_floor(work):
-        work.t_stop, work.status = t1, cause
+    step_control.reject(work, t1, h * factor, cause)
 
 
 class AdamsIntegration(Integration):
@@ -476,7 +471,6 @@ class AdamsIntegration(Integration):
             "next_order": range(1 if found["first_stage_valid"] else 0, HIGHEST + 1),
             "last_order": range(HIGHEST + 1),
             "is_starting": (0, 1),
-            **dict.fromkeys(("equal_steps", "failure_count"), range(at.MOST_COUNTED)),
         }
 
     def state_within(self, t: float) -> Floats | None:
@@ -491,8 +485,3 @@ class AdamsIntegration(Integration):
         if self.work.first_stage_valid == 0:
             return None
         return self.work.differences[0].copy()
-
-    @property
-    def order(self) -> int:
-        """Order of the next step."""
-        return int(self.work.next_order)

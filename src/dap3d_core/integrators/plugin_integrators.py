@@ -1,9 +1,9 @@
 """Integrators of dap3d and of other packages, by name."""
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
-from dap3d_core.integrators import EXPLICIT, INTEGRATORS, Integration, Integrator, explicit
+from dap3d_core.integrators import EXPLICIT, INTEGRATORS, Integrator, explicit
 from dap3d_core.integrators.runge_kutta.tableau import Tableau, lower_triangle
 
 if TYPE_CHECKING:
@@ -30,11 +30,7 @@ def _of_package(name: str) -> Integrator:
     from dap3d_core.registry.extensions import extensions
 
     tableau = tableau_of(extensions("integrator").load(name))
-
-    def make(*args: Any, **options: Any) -> Integration:
-        return explicit(tableau, *args, **options)
-
-    return Integrator(name, make, adaptive=tableau.adaptive)
+    return Integrator(name, partial(explicit, tableau), adaptive=tableau.adaptive)
 
 
 def tableau_of(method: "RungeKuttaMethod") -> Tableau:

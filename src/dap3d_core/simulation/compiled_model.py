@@ -158,13 +158,10 @@ class CompiledModel:
 
     def _check_expressions(self) -> None:
         """SceneError for expressions that no result of the scene would have."""
-        if self.scene.outputs:
-            from dap3d_core.simulation.output.check_outputs import check_outputs
+        if self.scene.outputs or self.model.active:
+            from dap3d_core.simulation.output.check_outputs import check_active, check_outputs
 
             check_outputs(self.scene, self.scene_text, self.evaluator)
-        if self.model.active:
-            from dap3d_core.simulation.output.check_outputs import check_active
-
             check_active(self.scene, self.scene_text, self.evaluator)
 
     def _take_method(self, requested: str, announce: Announce) -> None:

@@ -59,7 +59,12 @@ def choose_method(model: Model, requested: str) -> tuple[str, str]:
             f"use {'lsq' if model.breaks else 'lsq, joint'} or auto"
         )
     if model.breaks:
-        return _method_of_breaks(model, requested)
+        if requested in ("auto", "lsq"):
+            return "lsq", "joints may break or hold at times"
+        raise SimulationError(
+            f"method {requested} does not fit: joint {next(iter(model.breaks))} may end "
+            "(breaks_at, active), and its rows are zero then; use lsq or auto"
+        )
     constrained = model.row_count > 0
     usual = next(f.name for f in FORMULATIONS.values() if f.needs_joints == constrained)
     if requested == "auto":
@@ -79,17 +84,6 @@ def method_note(method: str, reason: str, requested: str) -> Note:
     return information(text) if requested in ("auto", method) else Note(text)
 
 
-def _method_of_breaks(model: Model, requested: str) -> tuple[str, str]:
-    """As ``choose_method``, of a model with joints that may be released."""
-    some_joint = next(iter(model.breaks))
-    if requested in ("auto", "lsq"):
-        return "lsq", "joints may break or hold at times"
-    raise SimulationError(
-        f"method {requested} does not fit: joint {some_joint} may end (breaks_at, active), and its "
-        "rows are zero then; use lsq or auto"
-    )
-
-
 def explain(
     checked: ValidatedScene,
     evaluator: Evaluator,
@@ -101,8 +95,6 @@ def explain(
     """A text for people, one fact a line.
 
     Args:
-        checked: the scene.
-        evaluator: its model.
         method: the method, and why.
         joint_cost: estimate of the time by method joint, over that of the method, or None.
         u: (13 n,) where a run would start.

@@ -158,7 +158,6 @@ def lengths_at(evaluator: Evaluator, t: float, y: Floats, span: float) -> Floats
     A length that falls ever slower is given the mean rate until it vanishes.
 
     Args:
-        evaluator: the model.
         t, y: state of the motion, on the constraints.
         span: length of the run, s.
     """

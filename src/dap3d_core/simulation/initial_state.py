@@ -26,23 +26,17 @@ class InitialState:
         u: (13 n,) the state.
         initial: what its correction did; None where it was not corrected.
         redundancy: of the constraints there.
-        state: what was taken in place of the scene's initial conditions; None for these.
+        angles: (angles,) from which turns are counted on; None where they begin at zero.
+        states: (s,) of elements; None for their initial values.
+        notes: where it comes from, if not from the scene.
     """
 
     u: Floats
     initial: assemble.Initial | None
     redundancy: Redundancy
-    state: "StartState | None" = None
-
-    @property
-    def angles(self) -> Floats | None:
-        """(angles,) angles from which turns are counted on; None where they begin at zero."""
-        return None if self.state is None else self.state.angles
-
-    @property
-    def states(self) -> Floats | None:
-        """(s,) states of elements; None for their initial values."""
-        return None if self.state is None else self.state.states
+    angles: Floats | None = None
+    states: Floats | None = None
+    notes: tuple[str, ...] = ()
 
 
 def find_start(
@@ -55,7 +49,6 @@ def find_start(
     """The start of a run.
 
     Args:
-        evaluator: the model.
         correct: whether its initial conditions are brought onto the constraints.
         hold: names of bodies that the correction of positions leaves where they are.
         metric: "unit" or "mass", of ``correct_initial``.
@@ -64,21 +57,23 @@ def find_start(
     Raises:
         AssemblyError: the positions cannot be assembled, or a row is not finite.
     """
-    u, initial = evaluator.model.u0 if state is None else state.u, None
-    given = None if state is None else state.states
-    evaluator.states = evaluator.model.initial_states if given is None else given
+    u, angles, states, initial = evaluator.model.u0, None, None, None
+    notes: tuple[str, ...] = ()
+    if state is not None:
+        u, angles, states, notes = state.u, state.angles, state.states, state.notes
+    evaluator.states = evaluator.model.initial_states if states is None else states
     if evaluator.has_unknowns:  # whatever was evaluated before
-        evaluator.start(0.0, u, None if state is None else state.angles, given)
+        evaluator.start(0.0, u, angles, states)
     if correct or (state is not None and state.is_interpolated):
         held = [evaluator.model.body_names.index(name) + 1 for name in hold]
         initial = assemble.correct_initial(evaluator, u, hold=held, metric=metric)
         u = initial.u
-    return InitialState(u, initial, redundancy_of(evaluator, u), state)
+    return InitialState(u, initial, redundancy_of(evaluator, u), angles, states, notes)
 
 
 def start_notes(start: InitialState, evaluator: Evaluator, scene: Scene) -> list[str]:
     """Text on the correction of a start, or that it is off the constraints."""
-    notes = list(start.state.notes) if start.state is not None else []
+    notes = list(start.notes)
     if start.initial is not None:
         return notes + assemble.correction_notes(start.initial, evaluator, scene)
     position, velocity = assemble.violation(evaluator, start.u)

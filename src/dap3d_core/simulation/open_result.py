@@ -2,6 +2,8 @@
 
 import os
 from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
 
 import attrs
 
@@ -50,16 +52,15 @@ def open_result(
     home = None if model is None else load(model).path
 
     def rebuild(scene_text: str) -> tuple[Model, Callable[[], Evaluator]]:
-        scene = parse(scene_text)
-        scene.path = home
-        try:
-            compiled = CompiledModel(scene, allow_code=allow_code)
-        except (PluginError, SceneError, SimulationError) as error:
-            reason = rebuild_error(error, allowed=allow_code and home is not None)
-            raise ResultError(
+        compiled = compile_again(
+            scene_text,
+            home,
+            lambda reason: ResultError(
                 f"the model of {path} cannot be made again, which the Jacobian, reactions and "
                 f"forces need: {reason}. All other arrays are in the file"
-            ) from error
+            ),
+            allow_code=allow_code,
+        )
         _check_types(path, known, compiled)
         return compiled.model, lambda: compiled.evaluator
 
@@ -85,19 +86,27 @@ def _check_types(
         )
 
 
-def rebuild_error(error: Exception, *, allowed: bool) -> str:
-    """Message for a stored scene whose model cannot be made, with the remedy.
+def compile_again(
+    scene_text: str, home: Path | None, refuse: Callable[[str], Exception], **options: Any
+) -> CompiledModel:
+    """The model of a stored scene.
 
     Args:
-        error: the error that was raised.
-        allowed: whether the types of a model's own file were allowed.
+        scene_text: the scene.
+        home: folder of its own types, which the file does not say; None for none.
+        refuse: makes an error of the reason why there is no such model, with the remedy.
+        options: of ``CompiledModel``, ``allow_code`` among them.
     """
-    mistakes = getattr(error, "mistakes", None)
-    reason = mistakes[0].what if mistakes else str(error)
-    if allowed:
-        return f"{reason}; install what brings the type"
-    return (
-        f"{reason}; install what brings the type or, where that is the plugin.py of the model, "
-        "name the model and allow its code: model=FOLDER, allow_code=True, or on the command line "
-        "--model FOLDER --allow-code"
-    )
+    scene = parse(scene_text)
+    scene.path = home
+    try:
+        return CompiledModel(scene, **options)
+    except (PluginError, SceneError, SimulationError) as error:
+        mistakes = getattr(error, "mistakes", None)
+        reason = f"{mistakes[0].what if mistakes else error}; install what brings the type"
+        if not options["allow_code"] or home is None:
+            reason += (
+                " or, where that is the plugin.py of the model, name the model and allow its code: "
+                "model=FOLDER, allow_code=True, or on the command line --model FOLDER --allow-code"
+            )
+        raise refuse(reason) from error

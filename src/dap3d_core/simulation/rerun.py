@@ -7,14 +7,12 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.interface import PluginError
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Computed, Result, ResultError, current_versions
 from dap3d_core.result.arrays import COLUMNS, Arrays, is_summary_of
-from dap3d_core.scene import SceneError, load, parse
-from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.scene import load
 from dap3d_core.simulation.errors import SimulationError
-from dap3d_core.simulation.open_result import open_result, rebuild_error
+from dap3d_core.simulation.open_result import compile_again, open_result
 from dap3d_core.simulation.output.monitor import RunProgress
 from dap3d_core.simulation.output.type_sources import changed_types
 from dap3d_core.simulation.run_state import GIVEN_START
@@ -77,16 +75,12 @@ def rerun(
     """
     first = result if isinstance(result, Result) else open_result(result)
     settings = _settings(first)
-    scene = parse(first.scene_text)
-    scene.path = None if model is None else load(model).path
-    try:
-        compiled = CompiledModel(
-            scene, method=first.settings["method"], allow_code=allow_code, announce=announce,
-            joint=first.method == "joint",
-        )  # fmt: skip
-    except (PluginError, SceneError) as error:
-        words = rebuild_error(error, allowed=allow_code and model is not None)
-        raise ResultError(f"the run cannot be made again: {words}") from error
+    compiled = compile_again(
+        first.scene_text, None if model is None else load(model).path,
+        lambda reason: ResultError(f"the run cannot be made again: {reason}"),
+        method=first.settings["method"], allow_code=allow_code, announce=announce,
+        joint=first.method == "joint",
+    )  # fmt: skip
     if not is_summary_of(first.summary, compiled.model):
         raise ResultError(
             "the run cannot be made again: the scene in its result gives other bodies or joints "

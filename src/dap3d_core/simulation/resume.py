@@ -13,29 +13,26 @@ from dap3d_core.assembly.arrays import UNSETTLED
 from dap3d_core.integrators import Status
 from dap3d_core.integrators.stepping.integration_state import MOST_COUNTED
 from dap3d_core.integrators.stepping.restore import check_alike, restored
-from dap3d_core.interface import PluginError
 from dap3d_core.kernels.runtime.source_digest import driver_digest
 from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result, current_versions, information
 from dap3d_core.result.file.validate import are_texts
-from dap3d_core.scene import SceneError, Simulation, check_simulation, load, parse
+from dap3d_core.scene import SceneError, Simulation, check_simulation, load
 from dap3d_core.simulation.checkpoint.save import (
-    Checkpoint,
     parts_of,
     path_of,
     read_checkpoint,
     remove_parts,
     results_of,
 )
-from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.control.sampled import Controller
 from dap3d_core.simulation.errors import CheckpointError
 from dap3d_core.simulation.events.event import Event
 from dap3d_core.simulation.handover import switch_integrator
 from dap3d_core.simulation.initial.given_state import state_of
 from dap3d_core.simulation.initial.start_state import StartState
-from dap3d_core.simulation.open_result import rebuild_error
+from dap3d_core.simulation.open_result import compile_again
 from dap3d_core.simulation.output.monitor import RunProgress
 from dap3d_core.simulation.output.type_sources import digests_of
 from dap3d_core.simulation.run import Run
@@ -80,24 +77,11 @@ def resume(
         PluginError, SceneError: a type is not installed.
         SimulationError, ResultError: as ``simulate``.
     """
-    found = resumption(path, model=model, allow_code=allow_code, announce=announce)
+    found = ResumedRun(path, model=model, allow_code=allow_code, announce=announce)
     return found.execute(
         output, force=force, checkpoint=checkpoint, events=events, progress=progress, watch=watch,
         controllers=controllers,
     )  # fmt: skip
-
-
-def resumption(
-    path: str | os.PathLike[str],
-    *,
-    model: str | os.PathLike[str] | None = None,
-    allow_code: bool = False,
-    announce: Callable[[str], None] | None = None,
-) -> "ResumedRun":
-    """A checkpoint read, its model compiled; arguments and errors as of ``resume``."""
-    place = Path(path)
-    found = read_checkpoint(place)
-    return ResumedRun(place, found, model=model, allow_code=allow_code, announce=announce)
 
 
 class ResumedRun:
@@ -110,29 +94,25 @@ class ResumedRun:
 
     def __init__(
         self,
-        path: Path,
-        found: Checkpoint,
+        path: str | os.PathLike[str],
         *,
-        model: str | os.PathLike[str] | None,
-        allow_code: bool,
-        announce: Callable[[str], None] | None,
+        model: str | os.PathLike[str] | None = None,
+        allow_code: bool = False,
+        announce: Callable[[str], None] | None = None,
     ) -> None:
-        """Make the model again; arguments and errors as of ``resume``."""
-        self.path, self._found, self._announce = path, found, announce
-        header = found.header
-        scene = parse(header["scene"])
-        scene.path = None if model is None else load(model).path
-        try:
-            self.compiled = CompiledModel(
-                scene, method=header["method"], allow_code=allow_code, announce=announce,
-                joint=header.get("formulation") == "joint",  # which older checkpoints lack
-            )  # fmt: skip
-        except (PluginError, SceneError) as error:
-            words = rebuild_error(error, allowed=allow_code and model is not None)
-            raise CheckpointError(f"cannot resume from {path}: {words}") from error
+        """Read a checkpoint, compile its model; arguments and errors as of ``resume``."""
+        self.path = Path(path)
+        self._found = read_checkpoint(self.path)
+        header = self._found.header
+        self.compiled = compile_again(
+            header["scene"], None if model is None else load(model).path,
+            lambda reason: CheckpointError(f"cannot resume from {path}: {reason}"),
+            method=header["method"], allow_code=allow_code, announce=announce,
+            joint=header.get("formulation") == "joint",  # which older checkpoints lack
+        )  # fmt: skip
         self._check_types()
         # its name alone: what a file says does not point out of its folder
-        self.output = path.with_name(Path(header["output"]).name)
+        self.output = self.path.with_name(Path(header["output"]).name)
 
     def execute(
         self,
@@ -161,7 +141,7 @@ class ResumedRun:
 
         with self.compiled.borrow_evaluator():
             run = Run(self.compiled, self._settings(),
-                      Callbacks(announce=self._announce, progress=progress, watch=watch), events,
+                      Callbacks(progress=progress, watch=watch), events,
                       output=target, force=force or is_own, identity=header["run"],
                       estimate_error=bool(header["estimate_error"]),
                       start=self._start_state(), controllers=controllers)  # fmt: skip
@@ -230,37 +210,38 @@ class ResumedRun:
         stored, model = self._found.arrays, self.compiled.model
         if "start.u" not in stored:
             return None
-        angles = stored.get("start.angles")
-        if (0 if angles is None else angles.size) != model.angle_count:
-            raise self._damaged("the turns of its start are of another model")
+        for name, count in (("angles", model.angle_count), ("states", model.state_count)):
+            numbers = stored.get(f"start.{name}", np.zeros(0))
+            if numbers.size != count or not np.isfinite(numbers).all():
+                raise self._damaged(f"the {name} of its start are of another model, or not finite")
         try:
             u = state_of(stored["start.u"], model.body_names)
         except ValueError as error:
             raise self._damaged(f"its start: {error}") from error
-        if angles is not None and not np.isfinite(angles).all():
-            raise self._damaged("the turns of its start are not finite")
-        states = stored.get("start.states")
-        if (0 if states is None else states.size) != model.state_count or (
-            states is not None and not np.isfinite(states).all()
-        ):
-            raise self._damaged("the states of elements at its start are of another model")
         ended = self._found.header.get("start_without", [])
         if not are_texts(ended) or not set(ended) <= set(model.breaks):
             raise self._damaged("the joints that do not hold at its start are of another model")
         return StartState(
             u,
-            angles,
+            stored.get("start.angles"),
             is_interpolated=self._found.header.get("start_is_interpolated") is True,
-            states=states,
+            states=stored.get("start.states"),
             ended=tuple(ended),
         )
 
     def _restore(self, run: RunState) -> None:
         """Stand where the checkpoint was written."""
         header, stored = self._found.header, self._found.arrays
-        self._restore_events(run)
-        self._check_controllers(run)
+        locator, control = run.event_locator, run.control
+        events = locator.events if locator else ()
+        self._check_given("events", {"titles": [one.title for one in events]})
+        self._check_given("controllers", {
+            "titles": control.titles if control else [],
+            "every": [one.every for one in control.controllers] if control else [],
+        }, " and as often")  # fmt: skip
         try:
+            if locator is not None:
+                locator.restore(header.get("events"))
             if header["integrations"] == 2:
                 switch_integrator(run)
                 if run.integrations[0].implicit != ("0.own" in stored):  # which implicit ones have
@@ -277,8 +258,8 @@ class ResumedRun:
             restore_system(run, stored)
             if run.jumps is not None:
                 run.jumps.restore(header.get("jumps"))
-            if run.control is not None:
-                run.control.restore(header["controllers"], run.integrations)
+            if control is not None:
+                control.restore(header["controllers"], run.integrations)
             check_position(run, header["rows"])
         except ValueError as error:
             raise self._damaged(str(error)) from error
@@ -292,34 +273,14 @@ class ResumedRun:
             "Run the scene anew"
         )
 
-    def _restore_events(self, run: RunState) -> None:
-        events = self._found.header.get("events")
-        if not isinstance(events, dict | None) or not are_texts((events or {}).get("titles", [])):
-            raise self._damaged("its events should be a table")
-        titles = events.get("titles", []) if events else []
-        asked = [event.title for event in run.event_locator.events] if run.event_locator else []
-        if titles != asked:
+    def _check_given(self, what: str, here: Mapping[str, list[Any]], how: str = "") -> None:
+        """CheckpointError where events or controllers are not given as they were to the run."""
+        known = self._found.header.get(what) or {}
+        if any(known.get(key, []) != values for key, values in here.items()):
             raise CheckpointError(
-                f"cannot resume from {self.path}: the run has the events {titles or 'none'}, given "
-                f"are {asked or 'none'}; give the same again, in their order"
-            )
-        if events and run.event_locator is not None:
-            try:
-                run.event_locator.restore(events)
-            except ValueError as error:
-                raise self._damaged(str(error)) from error
-
-    def _check_controllers(self, run: RunState) -> None:
-        known = self._found.header.get("controllers") or {}
-        if not isinstance(known, dict) or not are_texts(known.get("titles", [])):
-            raise self._damaged("its controllers should be a table")
-        given = run.control.controllers if run.control else ()
-        titles, every = [one.title for one in given], [one.every for one in given]
-        if titles != known.get("titles", []) or every != known.get("every", []):
-            raise CheckpointError(
-                f"cannot resume from {self.path}: the run has the controllers "
-                f"{known.get('titles') or 'none'}, given are {titles or 'none'}; give the same "
-                "again, in their order and as often"
+                f"cannot resume from {self.path}: the run has the {what} "
+                f"{known.get('titles') or 'none'}, given are {here['titles'] or 'none'}; give the "
+                f"same again, in their order{how}"
             )
 
     def _notes(self, t: float) -> list[str]:

@@ -56,6 +56,8 @@ SECOND_RUN_FACTOR = 0.8
 class Run(RunState):
     """One run of a compiled model: initialise, integrate, finish."""
 
+    #: Whether rows are reported that show what functions of time do.
+    reports = True
     checkpoint_writer: "CheckpointWriter | None" = None
     singular: SingularStart | None = None
     shared_laws: "tuple[SharedLaw, ...]" = ()
@@ -166,16 +168,13 @@ class Run(RunState):
             state = found[how]
         start = self.compiled.start(*how, state)
         self.notes += start_notes(start, self.evaluator, scene)
-        self.notes += self.function_notes()
+        if self.reports:
+            dt = settings.dt or self.t_end / 100.0
+            self.notes += self.compiled.breakpoints(self.t_end).notes(settings, dt)
         self.rank = start.redundancy.rank.rank
         if start.redundancy.rank.redundant:
             self._judge_redundancy(start)
         return start
-
-    def function_notes(self) -> list[str]:
-        """Notes on functions that steps or reports do not follow."""
-        dt = self.settings.dt or self.t_end / 100.0
-        return self.compiled.breakpoints(self.t_end).notes(self.settings, dt)
 
     def _judge_redundancy(self, start: InitialState) -> None:
         """Refuse redundant rows, or note what they leave open."""

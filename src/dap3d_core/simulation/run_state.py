@@ -42,7 +42,7 @@ from dap3d_core.simulation.explain import method_note
 from dap3d_core.simulation.failure.monitors import CreepMonitor, UnilateralMonitor
 from dap3d_core.simulation.initial.tolerances import atol_notes, resolved_atol
 from dap3d_core.simulation.output.error_estimate import StepLimits, with_midpoints
-from dap3d_core.simulation.output.free_space import check_room, row_width
+from dap3d_core.simulation.output.free_space import check_room
 from dap3d_core.simulation.output.monitor import Observer, RunProgress
 from dap3d_core.simulation.output.termination import occurrences
 from dap3d_core.simulation.settings import report_times, settings_notes
@@ -201,12 +201,10 @@ class Callbacks:
     """Functions of the caller, or None.
 
     Attributes:
-        announce: called with the name of each kernel that has to be compiled.
         progress: called as progress(t, t_end) between chunks.
         watch: called between chunks with a ``RunProgress``.
     """
 
-    announce: Callable[[str], None] | None = None
     progress: Progress | None = None
     watch: Callable[[RunProgress], None] | None = None
 
@@ -288,7 +286,7 @@ class RunState:
             self._take(controllers)
         watch = callbacks.watch
         self.observer = None if watch is None else Observer(self.evaluator, self.t_end, watch)
-        check_room(len(self.times), row_width(self.evaluator), self.settings.dt, output)
+        check_room(len(self.times), compiled.model.row_layout.size, self.settings.dt, output)
         most = len(self.times) + 1  # an event may end a run between two of them
         self.recorder = ResultRecorder(
             compiled.model, lambda: compiled.evaluator, output, most, force=force, run=identity

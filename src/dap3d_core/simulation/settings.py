@@ -104,7 +104,6 @@ def replaced_notes(
     Where contacts are not stepped, this is ``contact_step`` alone.
 
     Args:
-        compiled: of the run.
         settings: of the run, as of ``settings_of``.
         asked: what it was called with.
     """

@@ -68,7 +68,7 @@ def simulate(
     simulation = settings_of(compiled, start=start_word(start), **settings)
     check_checkpoint(checkpoint, output)
     with compiled.borrow_evaluator():
-        callbacks = Callbacks(announce=announce, progress=progress, watch=watch)
+        callbacks = Callbacks(progress=progress, watch=watch)
         run = Run(compiled, simulation, callbacks, events,
                   output=output, force=force, estimate_error=estimate_error,
                   start=given_state(start, compiled), controllers=controllers)  # fmt: skip

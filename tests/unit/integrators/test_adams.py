@@ -142,7 +142,7 @@ def test_error_is_proportional_to_the_tolerance():
         errors.append(np.abs(run.y - kepler_orbit(30.0)).max())
     assert 0.8 < slope(tolerances, errors) < 1.2
     other = solve_ivp(kepler_f, (0, 30), kepler_orbit(0.0), "DOP853", rtol=1e-11, atol=1e-11)
-    assert run.order > 8
+    assert run.work.next_order > 8
     assert run.statistics.rhs < 0.75 * other.nfev
 
 

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from dap3d_core.cli.framework.execute import Announce, Watch
     from dap3d_core.result import Result
     from dap3d_core.simulation import CompiledModel
-    from dap3d_core.simulation.resume import ResumedRun
 
 
 @command(
@@ -50,14 +49,14 @@ def resume(
     from dap3d_core.cli.framework.paths import RESULTS, writable
     from dap3d_core.result import ResultError
     from dap3d_core.simulation import CheckpointError
-    from dap3d_core.simulation.resume import resumption
+    from dap3d_core.simulation.resume import ResumedRun
 
     resumed: list[ResumedRun] = []
 
     def prepare(announce: "Announce") -> "CompiledModel":
         with refusing(ResultError):
             resumed.append(
-                resumption(checkpoint, model=model, allow_code=allow_code, announce=announce)
+                ResumedRun(checkpoint, model=model, allow_code=allow_code, announce=announce)
             )
         return resumed[0].compiled
 

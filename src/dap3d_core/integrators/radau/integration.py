@@ -294,9 +294,8 @@ class RadauIntegration(Integration):
         """As ``Integration.restored``."""
         if name == "own":
             return restored(name, array, found, self.indices("own", ("regularisation",)))
-        if name.startswith("method.") or (array.dtype.kind == "i" and "." in name):
-            return restored(name, array, found, range(len(array)))
-        if name in ("tolerances", "counts"):
+        is_constant = name.startswith("method.") or name in ("tolerances", "counts")
+        if is_constant or (array.dtype.kind == "i" and "." in name):
             return restored(name, array, found, range(len(array)))
         if name in ("pivots", "pivotsc"):
             check_alike(name, found, array)
@@ -328,13 +327,6 @@ class RadauIntegration(Integration):
             int(w.error_refusals), int(w.iteration_refusals), int(w.singular_refusals),
             int(np.argmax(w.blamed)),
         )  # fmt: skip
-
-    @property
-    def multipliers(self) -> tuple[Any, Any]:
-        """(rows,) mu and lambda of the last stage, in the order of the model."""
-        row = self.evaluator.system.row
-        last = self.work.last_multipliers[self.work.last_stages - 1]
-        return last[0, row].copy(), last[1, row].copy()
 
 
 def estimate_tolerances(rtol: float, atol: ArrayLike, stages: int) -> tuple[float, float, Any]:

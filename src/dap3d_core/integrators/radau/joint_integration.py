@@ -281,8 +281,3 @@ class JointRadauIntegration(RadauIntegration):
         """As ``Integration.all_arrays``."""
         yield from Integration.all_arrays(self)
         yield from self.tangent.walk("tangent.")
-
-    @property
-    def multipliers(self) -> tuple[Any, Any]:
-        """There are none."""
-        return np.zeros(0), np.zeros(0)

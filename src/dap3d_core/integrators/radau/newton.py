@@ -21,11 +21,11 @@ from dap3d_core.integrators.radau import convergence
 from dap3d_core.integrators.radau.state import SLOPE, Given, RadauState
 from dap3d_core.integrators.radau.tableau import FEWEST
 from dap3d_core.integrators.stepping.integration_state import SCRATCH, Y
+from dap3d_core.integrators.stepping.step_control import EPSILON, LARGEST
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.scalar_math import is_differentiated, with_slopes
 from dap3d_core.linear.lu import factor_lu, solve_lu
 
-EPSILON = 2.220446049250313e-16
 #: Iterations at most with 3 stages, more for each further two; more where the step is fixed, for
 #: a shorter one is no choice there.
 MOST, MORE, MOST_FIXED = 10, 5, 40
@@ -38,7 +38,6 @@ SAME_STEP = 1e-3
 UNSEEN_CHANGE, UNSEEN_RATE = 0.1, 2e-3
 #: A step whose stages were not found is halved.
 UNFOUND = 0.5
-LARGEST = 1.7976931348623157e308
 
 
 @compiled

@@ -7,7 +7,7 @@ import attrs
 
 from dap3d_core.assembly.arrays import System
 from dap3d_core.integrators.radau.tableau import MOST_STAGES, RadauMethod
-from dap3d_core.integrators.stepping.integration_state import MOST_COUNTED, STATES, IntegrationState
+from dap3d_core.integrators.stepping.integration_state import STATES, IntegrationState
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import (
     ComplexMatrix,
@@ -30,20 +30,6 @@ RTOL, LIMIT, ATOL = range(3)
 #: Values of its integers between two chunks of a run, as ``allowed_integers`` has them.
 ALLOWED: dict[str, Container[int]] = {
     **dict.fromkeys(("tangent_needed", "tangent_is_current", "has_last_step"), (0, 1)),
-    **dict.fromkeys(
-        (
-            "iteration_count",
-            "last_iterations",
-            "jacobian_count",
-            "factorisation_count",
-            "steps_at_order",
-            "patience",
-            "error_refusals",
-            "iteration_refusals",
-            "singular_refusals",
-        ),
-        range(MOST_COUNTED),
-    ),
     "dense_degree": range(TERMS),
 }
 

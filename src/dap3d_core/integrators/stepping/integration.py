@@ -186,11 +186,6 @@ class Integration(Restorable):
         work.projects, work.calls_accepted = project_on, watched
         work.t_limit = work.step_limit_at_switch = work.longest_step = np.inf
 
-    @property
-    def functions(self) -> Any:
-        """The table of functions that it was made with."""
-        return self._arguments[0]
-
     def own_arrays(self, size: int, length_count: int) -> dict[str, Any]:
         """Further arrays of ``work``, for ``size`` components."""
         raise NotImplementedError

@@ -183,7 +183,7 @@ MOST_COUNTED = 2**52
 
 
 def allowed_integers(work: Any, found: Any) -> dict[str, Container[int]]:
-    """Values of each integer that is no setting between two chunks of a run.
+    """Values of integers that are neither settings nor counts between two chunks of a run.
 
     Args:
         work: of the same run, with its settings.
@@ -207,13 +207,7 @@ def allowed_integers(work: Any, found: Any) -> dict[str, Container[int]]:
         "end_status": {0, Status.ENDED, *by_switch},
         "terminal_switch": range(max(1, switches)),
         "near_switch": range(-1, max(1, switches)),
-        **dict.fromkeys(
-            ("step_count", "rejected_count", "rhs_count", "projection_count", "report_count",
-             "near_singular_landings", "cut_attempts", "crossing_count", "stiff_steps",
-             "nonstiff_steps", "stalled_steps", "attempt_count", "stall_start"),
-            range(MOST_COUNTED),
-        ),
-    }  # fmt: skip
+    }
 
 
 def allowed_reals(work: Any) -> dict[str, tuple[float, float]]:

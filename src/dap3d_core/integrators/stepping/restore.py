@@ -41,9 +41,10 @@ class Restorable:
         """
         new = {name: self.restored(name, a, found.get(name)) for name, a in self.all_arrays()}
         integers, reals = self.scalars(new, "integer"), self.scalars(new, "real")
-        for key, values in self.allowed_integers(integers).items():
-            if integers[key] not in values:
-                raise ValueError(f"{key} is {integers[key]}, which no run can have there")
+        allowed = self.allowed_integers(integers)
+        for key, value in integers.items():
+            if value not in allowed.get(key, range(at.MOST_COUNTED)):
+                raise ValueError(f"{key} is {value}, which no run can have there")
         for key, (least, most) in at.allowed_reals(self.work).items():
             if not least <= reals[key] <= most:
                 raise ValueError(f"{key} is {reals[key]:g}, which no run can have there")

@@ -30,9 +30,10 @@ from dap3d_core.simulation.control.held_inputs import HeldInputs
 from dap3d_core.simulation.events.contact_jumps import ContactJumps
 from dap3d_core.simulation.events.uncarried_contact import UncarriedContact
 from dap3d_core.simulation.initial.breakpoints import stops_of
+from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks, jumps_of
 from dap3d_core.simulation.settings import compiled_for, settings_of
-from dap3d_core.simulation.stepwise.stepped_run import HORIZON, OpenRun
+from dap3d_core.simulation.stepwise.stepped_run import HORIZON
 from dap3d_core.study.batch.compiled_batch import begin_functions, start_constants
 from dap3d_core.study.batch.initial_state import begin_free
 
@@ -255,8 +256,8 @@ class PreparedRun:
         # three reporting times: the start, where the run is to be reported next, and the end
         chosen = settings_of(compiled, t_end=self.t_end, dt=0.5 * self.t_end, **settings)
         with compiled.borrow_evaluator():
-            run = OpenRun(compiled, chosen, Callbacks())
-            self.compiled, self.run = compiled, run
+            self.compiled, self.run = compiled, (run := Run(compiled, chosen, Callbacks()))
+            run.reports = False
             self.evaluator: Evaluator = compiled.new_evaluator()
             run.evaluator = self.evaluator
             self._take_jumps()

@@ -46,8 +46,10 @@ def check_shapes(file: Path, shapes: Iterable[tuple[int, ...]], byte_count: int)
         )
 
 
-def check_forms(found: Mapping[str, Any], forms: Mapping[str, Form]) -> None:
-    """Raises ValueError for the first entry that is not of its form."""
+def check_forms(found: Any, forms: Mapping[str, Form]) -> None:
+    """Raises ValueError for the first entry that is not of its form, and for what is no table."""
+    if not isinstance(found, Mapping):
+        raise ValueError(f"{', '.join(forms)} should be the entries of a table")
     for name, (fits, what) in forms.items():
         if not fits(found.get(name)):
             raise ValueError(f"{name} should be {what}")
@@ -102,9 +104,13 @@ def is_text(value: Any) -> bool:
     return isinstance(value, str)
 
 
-def list_of(fits: Test) -> Test:
-    """The test for a list whose entries all pass a test."""
-    return lambda value: isinstance(value, list) and all(map(fits, value))
+def list_of(fits: Test, *lengths: int) -> Test:
+    """The test for a list whose entries all pass a test, of one of the lengths if any is given."""
+    return lambda value: (
+        isinstance(value, list)
+        and len(value) in (lengths or (len(value),))
+        and all(map(fits, value))
+    )
 
 
 def table_of(fits: Test) -> Test:

@@ -45,6 +45,10 @@ def _is_duration(value: Any) -> bool:
     return validate.is_number(value) and value >= 0.0
 
 
+def _has_titles(value: Any) -> bool:
+    return value is None or (isinstance(value, dict) and validate.are_texts(value.get("titles")))
+
+
 #: Keys of a header.
 KEYS: dict[str, validate.Form] = {
     **dict.fromkeys(("run", "output", "scene", "driver", DIGEST), (validate.is_text, "a text")),
@@ -58,6 +62,7 @@ KEYS: dict[str, validate.Form] = {
     "estimate_error": (lambda value: isinstance(value, bool), "true or false"),
     "notes": (validate.are_texts, "a list of texts"),
     **dict.fromkeys(("types", "versions"), (validate.is_table_of_texts, "a table of texts")),
+    **dict.fromkeys(("events", "controllers"), (_has_titles, "a table with titles, or nothing")),
 }
 
 _HEADER = "checkpoint.json"

@@ -15,7 +15,7 @@ from dap3d_core.integrators.stepping.integration_state import MOST_COUNTED, Y
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import by_body
 from dap3d_core.result import information
-from dap3d_core.result.file.validate import is_number
+from dap3d_core.result.file.validate import check_forms, is_number, list_of
 from dap3d_core.scene.coerce import plain
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.control.held_inputs import HeldInputs
@@ -251,22 +251,15 @@ class SampledControl:
         Raises:
             ValueError: it is not of that form.
         """
-        counts, inputs, holds = _lists(
-            found,
-            counts=len(self.controllers),
-            inputs=len(self._inputs.values),
-            holds=len(integrations),
-        )
-        if not all(type(k) is int and 0 <= k < MOST_COUNTED for k in counts):
-            raise ValueError("the samples of its controllers should be counts")
-        if not all(map(is_number, inputs)):
-            raise ValueError("its inputs should be finite numbers")
-        self._counts = counts
-        self._inputs.replace(inputs)
+        check_forms(found, {
+            "counts": (list_of(_is_count, len(self.controllers)), "counts of samples"),
+            "inputs": (list_of(is_number, len(self._inputs.values)), "a number for each input"),
+            "holds": (list_of(_is_hold, len(integrations)), "a hold of each integration"),
+        })  # fmt: skip
+        self._counts = list(found["counts"])
+        self._inputs.replace(found["inputs"])
         self._next = self._next_instant()
-        for integration, hold in zip(integrations, holds, strict=True):
-            if not (isinstance(hold, dict) and all(is_number(hold.get(n)) for n in HOLD)):
-                raise ValueError("what is known of its holds is damaged")
+        for integration, hold in zip(integrations, found["holds"], strict=True):
             self._hold_of(integration).restore(hold)
 
     def put_back(self) -> None:
@@ -274,13 +267,12 @@ class SampledControl:
         self._evaluator.set_inputs(self._evaluator.model.input_values)
 
 
-def _lists(found: Mapping[str, Any], **lengths: int) -> list[list[Any]]:
-    """Lists of these lengths in a checkpoint."""
-    values = [found.get(name) for name in lengths]
-    for value, length in zip(values, lengths.values(), strict=True):
-        if not isinstance(value, list) or len(value) != length:
-            raise ValueError("what is known of its controllers is damaged")
-    return [list(value) for value in values if isinstance(value, list)]
+def _is_count(value: Any) -> bool:
+    return type(value) is int and 0 <= value < MOST_COUNTED
+
+
+def _is_hold(value: Any) -> bool:
+    return isinstance(value, dict) and all(is_number(value.get(name)) for name in HOLD)
 
 
 def with_events(hold: Hold, locator: EventLocator, end: float) -> bool:

@@ -18,9 +18,14 @@ import numpy as np
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.simulation.equilibrium.search import BALANCED, held_solution, zero_stiffness
-from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics
+from dap3d_core.simulation.equilibrium.statics import (
+    StaticPose,
+    Statics,
+    moving_states,
+    refuse_carried,
+)
 from dap3d_core.simulation.errors import AssemblyError, SimulationError
-from dap3d_core.simulation.initial.least_change import displacement
+from dap3d_core.simulation.initial.least_change import largest_move
 
 #: The first step, and the shortest, at which the path ends; at most so many are taken. Lengths are
 #: of the parameter, as a part of its range, and of the root mean square of displacements, as parts
@@ -158,8 +163,6 @@ class ParameterStatics:
 
     def _check_states(self, pose: StaticPose) -> None:
         """Refuse a pose at which states of elements do not come to rest, or keep the way there."""
-        from dap3d_core.simulation.equilibrium.statics import moving_states, refuse_carried
-
         if self._first is None:
             self._first = pose.u
         refuse_carried(self.evaluator, self._first, pose.u)
@@ -179,7 +182,7 @@ class ParameterStatics:
             normal: (6 n + 1,) direction along which the equilibrium does not leave the prediction.
         """
         self.load(s)
-        pose = self._at(u, way / self.measure)
+        pose = self.statics.behind(u, way / self.measure)
         slopes: Slopes | None = None
         for _ in range(MOST_PASSES):
             if slopes is None or pose.residual > KEPT_BELOW:
@@ -190,7 +193,7 @@ class ParameterStatics:
                 return None
             states = self.evaluator.states
             self.load(following)
-            trial = self._at(pose.u, change[:-1])
+            trial = self.statics.behind(pose.u, change[:-1])
             if not trial.residual < pose.residual:
                 self.load(s)
                 self.evaluator.states = states
@@ -215,22 +218,14 @@ class ParameterStatics:
             self.load(s + offset * DIFFERENCE)
             u = self.statics.closed(pose.u) if offset else pose.u
             force += weight / DIFFERENCE * (pose.free.T @ self.statics.balance(u, pose))
-            shift += weight / DIFFERENCE * self.way(pose.u, u)
+            shift += weight / DIFFERENCE * self.statics.way(pose.u, u)
         self.load(s)
         self.evaluator.states = states
         return Slopes(K, force, shift, pose.free)
 
-    def way(self, u: Floats, other: Floats) -> Floats:
-        """(6 n,) scaled displacement from a state to another."""
-        shift, turn = displacement(u, other)
-        return np.hstack([shift / self.statics.length, turn]).ravel()
-
     def chord(self, a: PathPoint, s: float, u: Floats) -> Floats:
         """(6 n + 1,) from a point to the state u (13 n,) at s, in the measure of the path."""
-        return np.append(self.measure * self.way(a.pose.u, u), s - a.s)
-
-    def _at(self, u: Floats, way: Floats) -> StaticPose:
-        return self.statics.at(self.statics.closed(self.statics.moved(u, way)))
+        return np.append(self.measure * self.statics.way(a.pose.u, u), s - a.s)
 
     def _solve(self, pose: StaticPose, slopes: Slopes, normal: Floats, *, along: bool) -> Floats:
         """(6 n + 1,) Newton step across the normal, scaled; ``along``: the tangent on its side."""
@@ -300,8 +295,7 @@ class Continuation:
     def _next(self, a: PathPoint) -> PathPoint | None:
         """A point one step away, or at the next given value; None where the step is too long."""
         rate = float(a.tangent[-1])
-        rotations = (a.tangent[:-1] / self.family.measure).reshape(-1, 6)[:, 3:]
-        turn = float(np.max(np.linalg.norm(rotations, axis=1), initial=0.0))
+        _, turn = largest_move(a.tangent[:-1] / self.family.measure)
         length = min(self._step, MOST_TURN / turn if turn > 0.0 else np.inf)
         ahead = self.given[(self.given - a.s) * rate > 0.0]
         s = None

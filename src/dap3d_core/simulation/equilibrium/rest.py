@@ -18,7 +18,6 @@ from dap3d_core.simulation.equilibrium.search import (
     Outcome,
     Search,
     Stability,
-    search_equilibrium,
     stability_of,
 )
 from dap3d_core.simulation.equilibrium.statics import (
@@ -27,6 +26,8 @@ from dap3d_core.simulation.equilibrium.statics import (
     SETTLED,
     StaticPose,
     Statics,
+    moving_states,
+    refuse_carried,
     unsettled_part,
 )
 from dap3d_core.simulation.errors import AssemblyError, SimulationError, refuse_collisions
@@ -76,7 +77,6 @@ def find_rest(
     """The equilibrium that a model comes to from a state u (13 n,) on the constraints.
 
     Args:
-        evaluator: the model.
         u: the state; its velocities are left out.
         angles: (angles,) from which turns are counted on; None where they begin at zero.
         states: (s,) states of elements to begin with; None for their initial values.
@@ -88,9 +88,9 @@ def find_rest(
     evaluator.start(0.0, u, angles, states)
     if evaluator.model.contact_count:
         _hold_contacts(evaluator, u, "at the start of the search for an equilibrium")
-    search = search_equilibrium(evaluator, u)
+    search = Search(Statics(evaluator), u)
     if evaluator.model.state_count:
-        search = _with_states(evaluator, search, u)
+        _let_states_rest(evaluator, search, u)
     if search.outcome is not Outcome.BALANCED:
         raise SimulationError(failure(search, evaluator.model))
     statics, pose = Statics(evaluator), search.pose
@@ -194,25 +194,23 @@ def _with_brought(
     return multipliers, force
 
 
-def _with_states(evaluator: Evaluator, search: Search, u: Floats) -> Search:
-    """The search, its pose such that the states of elements are at rest as well.
+def _let_states_rest(evaluator: Evaluator, search: Search, u: Floats) -> None:
+    """Make the pose of a search from u one at which the states of elements are at rest as well.
 
     Raises:
         SimulationError: states do not come to rest, or keep the way there; names them.
     """
-    from dap3d_core.simulation.equilibrium.statics import moving_states, refuse_carried
-
     refuse_carried(evaluator, u, search.pose.u)
     moving = moving_states(evaluator, search.pose.u)
     if not moving:
-        return search
+        return
     statics = Statics(evaluator)
     statics.settles = False
     found = solve_coupled(statics, search.pose)
     if found is None:
         raise SimulationError(f"no equilibrium: the rate of {moving} vanishes neither for any "
                               "value of the state nor at another pose")  # fmt: skip
-    return attrs.evolve(search, pose=found, outcome=Outcome.BALANCED)
+    search.pose, search.outcome = found, Outcome.BALANCED
 
 
 def start_at_rest(evaluator: Evaluator, u: Floats) -> StartState:
@@ -248,8 +246,7 @@ def solve_coupled(statics: Statics, pose: StaticPose) -> StaticPose | None:
         step = _least_solution(matrix, -np.concatenate([pose.unbalanced, own.rates]))
         evaluator.states = evaluator.states + step[pose.free.shape[1] :]
         try:
-            moved = statics.moved(pose.u, pose.free @ step[: pose.free.shape[1]])
-            pose = statics.at(statics.closed(moved))
+            pose = statics.behind(pose.u, pose.free @ step[: pose.free.shape[1]])
         except (AssemblyError, np.linalg.LinAlgError):
             break
     evaluator.states = kept
@@ -301,7 +298,6 @@ def assumptions(evaluator: Evaluator, start: Floats, rows: ConstraintRows) -> It
     """Notes on what statics leaves out.
 
     Args:
-        evaluator: the model.
         start: (13 n,) the state that the search began at.
         rows: of the constraints at the equilibrium.
     """
@@ -358,10 +354,8 @@ def failure(search: Search, model: Model) -> str:
 def describe_motion(model: Model, x: Floats) -> str:
     """Which bodies move most, and how the first of these does.
 
-    Args:
-        model: names of the bodies.
-        x: (n, 6) or (6 n,) displacement in parts of a length of the scene, and rotation vector, of
-            each body, global axes.
+    x: (n, 6) or (6 n,) displacement in parts of a length of the scene, and rotation vector, of
+        each body, global axes.
     """
     x = np.asarray(x).reshape(-1, 6)
     shift, turn = (np.linalg.norm(part, axis=1) for part in (x[:, :3], x[:, 3:]))

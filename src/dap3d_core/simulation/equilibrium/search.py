@@ -12,12 +12,11 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import at_rest
 from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics
 from dap3d_core.simulation.errors import AssemblyError
-from dap3d_core.simulation.initial.least_change import displacement
+from dap3d_core.simulation.initial.least_change import largest_move
 
 #: A stiffness below this part of the largest is none: rounding errors of K.
 NEUTRAL = 1e-11
@@ -150,75 +149,53 @@ class Outcome(Enum):
     BALANCED, RUNAWAY, STALLED = "balanced", "runaway", "stalled"
 
 
-@attrs.frozen(eq=False)
 class Search:
-    """A search that has ended.
+    """A search from a state u (13 n,); its velocities are left out.
+
+    Turns of angles are counted on from those that the evaluator has.
 
     Attributes:
-        outcome: how.
+        outcome: how it has ended.
         pose: the last pose.
         steps: how many were taken.
         started_balanced: the start is an equilibrium.
-        left: the motion came to an unstable equilibrium, and left it to an arbitrary side.
-        motion: (n, 6) the last displacement, in parts of the scene's length, and rotation vector,
+        left: how often the motion came to an unstable equilibrium, and left it to either side.
+        motion: (6 n,) the last displacement, in parts of the scene's length, and rotation vector,
             rad, of each body.
-    """
-
-    outcome: Outcome
-    pose: StaticPose
-    steps: int
-    started_balanced: bool
-    left: bool
-    motion: Floats
-
-
-def search_equilibrium(evaluator: Evaluator, u: Floats, t: float = 0.0) -> Search:
-    """Search from a state u (13 n,); its velocities are left out.
-
-    Turns of angles are counted on from those that the evaluator has.
 
     Raises:
         AssemblyError: the start cannot be assembled.
     """
-    return _Search(Statics(evaluator, t), u).run()
-
-
-class _Search:
-    """The state of a search."""
 
     def __init__(self, statics: Statics, u: Floats) -> None:
-        self.statics = statics
+        self.statics, self.steps, self.left = statics, 0, 0
         self.pose = statics.at(statics.closed(at_rest(u)))
         model = statics.evaluator.model
         self.extent = max(model.extent, statics.length)
         self.radius = FIRST_RADIUS
-        self.path = np.zeros((model.body_count, 6))
-        self.motion = np.zeros_like(self.path)
-        self.leaves = 0
+        self.path = self.motion = np.zeros(6 * model.body_count)
         repeats = not model.own_angle_count and bool(np.all(model.position_row))
         self.most_turns = MOST_TURNS if repeats else MOST_COUNTED_TURNS
+        self.started_balanced = self.pose.residual <= BALANCED
+        self.outcome = self._run()
 
-    def run(self) -> Search:
+    def _run(self) -> Outcome:
         """Take steps until the forces are balanced, the motion runs away, or nothing helps."""
-        started_balanced = self.pose.residual <= BALANCED
-        if started_balanced:
-            return self._ended(Outcome.BALANCED, self._refine(), started_balanced)
         leaves = False
-        for steps in range(1, MOST_STEPS + 1):
+        while self.pose.residual > BALANCED or (leaves and self.left <= MOST_LEFT):
+            if self._is_far():
+                return Outcome.RUNAWAY
+            if self.steps == MOST_STEPS:
+                return Outcome.STALLED
+            self.steps += 1
             if not self._advance(leaves=leaves):
-                return self._ended(Outcome.STALLED, steps, False)
+                return Outcome.STALLED
             leaves = self.pose.residual <= BALANCED and self._is_unstable()
             if leaves:
-                self.leaves += 1
+                self.left += 1
                 self.radius = FIRST_RADIUS
-            if self.pose.residual <= BALANCED and (not leaves or self.leaves > MOST_LEFT):
-                return self._ended(Outcome.BALANCED, steps + self._refine(), False)
-            if self._is_far():
-                return self._ended(Outcome.RUNAWAY, steps, False)
-        return self._ended(Outcome.STALLED, MOST_STEPS, False)
-
-    def _ended(self, outcome: Outcome, steps: int, started_balanced: bool) -> Search:
-        return Search(outcome, self.pose, steps, started_balanced, self.leaves > 0, self.motion)
+        self._refine()
+        return Outcome.BALANCED
 
     def _is_unstable(self) -> bool:
         """Whether a stiffness at this pose is negative."""
@@ -239,7 +216,7 @@ class _Search:
             if trial is None:
                 self.radius *= SHRINK
                 continue
-            x = self._displacement(pose, trial)
+            x = self.statics.way(pose.u, trial.u)
             ratio = self._work(pose, trial, x) / step.gain if step.gain > 0.0 else -1.0
             settles = step.is_newton and trial.residual < 0.5 * pose.residual
             if ratio >= GOOD and not step.is_newton:
@@ -256,8 +233,7 @@ class _Search:
         pose = self.pose
         while True:
             step = trust_region_step(K, pose.unbalanced, pose.size, self.radius, leaves=leaves)
-            turn = np.linalg.norm((pose.free @ step.y).reshape(-1, 6)[:, 3:], axis=1)
-            largest = float(np.max(turn, initial=0.0))
+            _, largest = largest_move(pose.free @ step.y)
             if largest <= MOST_TURN:
                 return step
             self.radius = float(np.linalg.norm(step.y)) * 0.9 * MOST_TURN / largest
@@ -265,15 +241,10 @@ class _Search:
     def _trial(self, pose: StaticPose, step: Step) -> StaticPose | None:
         """The pose after a step; None where it cannot be assembled."""
         try:
-            u = self.statics.closed(self.statics.moved(pose.u, pose.free @ step.y))
-            trial = self.statics.at(u)
+            trial = self.statics.behind(pose.u, pose.free @ step.y)
         except (AssemblyError, np.linalg.LinAlgError):
             return None
         return trial if np.isfinite(trial.residual) else None
-
-    def _displacement(self, pose: StaticPose, trial: StaticPose) -> Floats:
-        shift, turn = displacement(pose.u, trial.u)
-        return np.hstack([shift / self.statics.length, turn])
 
     def _work(self, pose: StaticPose, trial: StaticPose, x: Floats) -> float:
         """Work of the forces from a pose to another, by the trapezoidal rule.
@@ -283,33 +254,33 @@ class _Search:
         """
         before = self.statics.balance(pose.u, pose)
         after = self.statics.balance(trial.u, pose)
-        return 0.5 * float((before + after) @ x.ravel())
+        return 0.5 * float((before + after) @ x)
 
     def _take(self, trial: StaticPose, x: Floats) -> None:
-        self.pose, self.motion = trial, x
-        self.path += x
+        self.pose, self.motion, self.path = trial, x, self.path + x
         self.statics.evaluator.count_turns(self.statics.t, trial.u)
 
     def _is_far(self) -> bool:
-        shift = np.linalg.norm(self.path[:, :3], axis=1) * self.statics.length
-        turn = np.linalg.norm(self.path[:, 3:], axis=1)
+        path = self.path.reshape(-1, 6)
+        shift = np.linalg.norm(path[:, :3], axis=1) * self.statics.length
+        turn = np.linalg.norm(path[:, 3:], axis=1)
         return bool(np.any(shift > FARTHEST_MOTION * self.extent) or np.any(turn > self.most_turns))
 
-    def _refine(self) -> int:
-        """Newton steps, as long as they help; returns their number."""
-        for steps in range(20):
+    def _refine(self) -> None:
+        """Newton steps, as long as they help."""
+        for _ in range(20):
             pose = self.pose
             if pose.residual <= LEAST_UNBALANCED:
-                return steps
+                return
             K = self.statics.stiffness(pose)
             y = held_solution(K, pose.unbalanced, pose.size)
             trial = self._trial(pose, Step(y, 0.0, True))
             if trial is None or not trial.residual < pose.residual:
-                return steps
-            self._take(trial, self._displacement(pose, trial))
+                return
+            self._take(trial, self.statics.way(pose.u, trial.u))
+            self.steps += 1
             if trial.residual > 0.5 * pose.residual:
-                return steps + 1
-        return 20
+                return
 
 
 @attrs.frozen(eq=False)
@@ -401,11 +372,10 @@ def _fate(statics: Statics, pose: StaticPose, modes: Floats) -> Fate:
     remains = False
     for x in (FINITE * mix, -FINITE * mix):
         try:
-            search = search_equilibrium(statics.evaluator, statics.moved(pose.u, x), statics.t)
+            search = Search(Statics(statics.evaluator, statics.t), statics.moved(pose.u, x))
         except AssemblyError:  # the other joints do not let it
             continue
-        shift, turn = displacement(pose.u, search.pose.u)
-        moved = float(np.max(np.abs(np.hstack([shift / statics.length, turn]))))
+        moved = float(np.max(np.abs(statics.way(pose.u, search.pose.u))))
         if search.outcome is not Outcome.BALANCED or moved > ESCAPED * FINITE:
             return Fate.ESCAPES
         remains |= moved > RETURNED * FINITE

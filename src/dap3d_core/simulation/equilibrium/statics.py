@@ -88,7 +88,6 @@ class Statics:
     """
 
     def __init__(self, evaluator: Evaluator, t: float = 0.0) -> None:
-        """Args: the evaluator, the time."""
         self.evaluator, self.t = evaluator, t
         self._size_nearby = 0.0
         self.settles = True
@@ -108,7 +107,10 @@ class Statics:
         force = self.force(u)
         D = rows.dense()
         left, values, right = np.linalg.svd(D, full_matrices=True)
-        rank = self._rank(values, D.shape)
+        zero = max(
+            tolerance_of(*D.shape) * np.max(values, initial=0.0), fit_of(self.evaluator.model)
+        )
+        rank = int(np.sum(values > zero))
         free = right[rank:].T
         multipliers = -left[:, :rank] @ ((right[:rank] @ force) / values[:rank])
         reaction = np.bincount(
@@ -153,20 +155,14 @@ class Statics:
     def stiffness(self, pose: StaticPose) -> Floats:
         """(f, f) Z^T K Z with K = -d(F + D^T lambda)/dx, the stiffness of reactions included.
 
-        States that keep the way of a motion stay as they are, as they do in ``force``.
-
-        Raises:
-            SimulationError: forces or rows have no derivative there.
+        States that keep the way of a motion stay as they are, as they do in ``force``. Errors as of
+        ``fixed_tangent``.
         """
         tangent = with_settled(self.fixed_tangent(pose), self.evaluator, keeps_way=False)
         return self.reduced(tangent.stiffness, pose)
 
     def tangent(self, pose: StaticPose) -> TangentMatrices:
-        """The equations of motion and their derivatives at a pose, at rest, states settled.
-
-        Raises:
-            SimulationError: forces or rows have no derivative there.
-        """
+        """The equations of motion and their derivatives at a pose, at rest, states settled."""
         return with_settled(self.fixed_tangent(pose), self.evaluator)
 
     def _settle(self, u: Floats) -> None:
@@ -189,10 +185,18 @@ class Statics:
         basis = self.scale[:, None] * pose.free
         return basis.T @ (matrix @ basis)
 
+    def way(self, u: Floats, other: Floats) -> Floats:
+        """(6 n,) the displacement from a state to another."""
+        shift, turn = displacement(u, other)
+        return np.hstack([shift / self.length, turn]).ravel()
+
+    def behind(self, u: Floats, x: Floats) -> StaticPose:
+        """The pose behind a displacement x (6 n,), closed; errors as of ``closed`` and ``at``."""
+        return self.at(self.closed(self.moved(u, x)))
+
     def moved(self, u: Floats, x: Floats) -> Floats:
         """The state after a displacement x (6 n,), not closed."""
-        change = (self.scale * x).reshape(-1, 6)
-        return displaced(u, change)
+        return displaced(u, self.scale * x)
 
     def closed(self, u: Floats) -> Floats:
         """The state with its position rows closed to rounding, by least displacements.
@@ -213,17 +217,10 @@ class Statics:
             best, before = u, worst
             if worst == 0.0:
                 break
-            change = sparse_least_change(self.evaluator, C, self.t).reshape(-1, 6)
-            u = displaced(u, -change)
+            u = displaced(u, -sparse_least_change(self.evaluator, C, self.t))
         if not before <= limit:
             raise AssemblyError(f"the positions do not close: |C| = {before:.2g}")
         return best
-
-    def _rank(self, values: Floats, shape: tuple[int, int]) -> int:
-        if not len(values):
-            return 0
-        blur = fit_of(self.evaluator.model)
-        return int(np.sum(values > max(tolerance_of(*shape) * values[0], blur)))
 
 
 def settle(evaluator: Evaluator, t: float, u: Floats) -> None:
@@ -257,13 +254,13 @@ def refuse_carried(evaluator: Evaluator, u: Floats, other: Floats) -> None:
             belts and deflections of bristles, and the motion would have changed them; or a joint
             drives by its states, as of a motor that is on the way to its position.
     """
-    shift, turn = displacement(u, other)
-    size = np.tile(np.repeat([evaluator.model.part_size, 1.0], 3), len(shift))
+    displaced_by = np.hstack(displacement(u, other)).ravel()
+    size = np.tile(np.repeat([evaluator.model.part_size, 1.0], 3), evaluator.model.body_count)
     moves = np.zeros(evaluator.model.state_count, bool)
     for pose in (u, other):
         own = _derivatives(evaluator, 0.0, pose)
         by_motion = _kept_way(own, _inverse(evaluator, own.rate_by_states))
-        change = np.abs(by_motion @ np.hstack([shift, turn]).ravel())
+        change = np.abs(by_motion @ displaced_by)
         moves |= change > STAYED * (abs(by_motion) @ size)
     driven = np.asarray(abs(own.velocity_by_states).sum(axis=1)).ravel() > 0.0
     speeds = evaluator.rows(0.0, other).nu

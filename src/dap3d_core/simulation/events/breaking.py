@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.model import Model
-from dap3d_core.result.file.validate import are_texts, is_number
+from dap3d_core.result.file.validate import are_texts, check_forms, is_number, is_text, list_of
 from dap3d_core.scene.expressions.expression import Expression
 from dap3d_core.scene.expressions.outputs import margin
 from dap3d_core.simulation.errors import SimulationError
@@ -56,7 +56,6 @@ class JointEvents:
     """
 
     def __init__(self, model: Model) -> None:
-        """Args: the model."""
         overloads = [
             Event(Overload(joint), above=limit, name=joint)
             for joint, limit in model.breaks.items()
@@ -92,16 +91,13 @@ class JointEvents:
         Raises:
             ValueError: it is not of that form.
         """
-        broken: Any = found.get("broken")
-        latest: Any = found.get("latest")
-        if not are_texts(broken) or not set(broken) <= known or not isinstance(latest, list):
-            raise ValueError("what is known of joints that ended is damaged")
-        if not all(isinstance(one, list) and len(one) == 2 and is_number(one[0])
-                   and isinstance(one[1], str) for one in latest):  # fmt: skip
-            raise ValueError("what is known of joints that ended lately is damaged")
-        self._broken = set(broken)
+        check_forms(found, {
+            "broken": (lambda value: are_texts(value) and set(value) <= known, "joints that end"),
+            "latest": (list_of(_is_change), "a list of instants with names of joints"),
+        })  # fmt: skip
+        self._broken = set(found["broken"])
         self._latest.clear()
-        self._latest.extend((float(t), names) for t, names in latest)
+        self._latest.extend((float(t), names) for t, names in found["latest"])
 
     def due(self, sides: Sequence[float], released: set[str]) -> tuple[list[str], list[str]]:
         """Joints that end and that hold again, where events are on these sides of their levels.
@@ -134,6 +130,10 @@ class JointEvents:
                 f"{MOST_CHANGES} times within {t - latest[0][0]:.2g} s: what they are active by "
                 "changes back as they do; compare with a margin, or with what they do not change"
             )
+
+
+def _is_change(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 2 and is_number(value[0]) and is_text(value[1])
 
 
 def share_notes(model: Model, redundancy: Redundancy) -> list[str]:

@@ -350,7 +350,6 @@ class ContactJumps(Jumps):
         """Velocities and modes at the present state.
 
         Args:
-            integration: of the run.
             touching: (m,) gap, m or rad, below which each contact touches.
             ended: (m, 2) True of switches of contacts that have changed their sign.
         """

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.model.parameter_change import Change, changed
+from dap3d_core.model.parameter_change import changed
 from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.registry.suggestions import nearest, some
 from dap3d_core.result import Result
@@ -350,20 +350,22 @@ class Numbers:
 
     def set(self, force: str, fields: dict[str, Any]) -> None:
         """As ``Instant.set``."""
-        names = self._compiled.model.force_names
+        model, par = self._compiled.model, self.evaluator.system.par
+        names = model.force_names
         if force not in names:
-            model = self._compiled.model
             known = (*names, *model.body_names, *model.input_names)
             near = nearest(force, known)
             hint = f"did you mean {near!r}?" if near else f"there are {some(known, 20)}"
             raise ValueError(f"there is no force, body or input {force!r}; {hint}")
-        model, par = self._compiled.model, self.evaluator.system.par
         change = changed(self._compiled.checked, model, names.index(force), fields)
         if self.given is None:
             self.given = par.copy()
-        rows = self._rows(change)
+        count, width = change.group.numbers.shape
+        first = self._first(change.group)
+        table = par[first : first + count * width].reshape(count, width)
+        rows = table[change.places]
         rows[change.where] = change.new[change.where]
-        self._write(change, rows)
+        table[change.places] = rows
 
     def changeable(self, forces: Collection[str]) -> NDArray[np.bool_]:
         """Mask of the numbers in ``par`` that ``set`` may have changed, given names of forces."""
@@ -390,16 +392,3 @@ class Numbers:
         evaluator = self.evaluator
         q = next(k for k, (_, g) in enumerate(evaluator.loop_groups) if g is group)
         return int(evaluator.system.groups[q, 1])
-
-    def _rows(self, change: Change) -> Floats:
-        count, width = change.group.numbers.shape
-        first = self._first(change.group)
-        table = self.evaluator.system.par[first : first + count * width]
-        found: Floats = table.reshape(count, width)[change.places]
-        return found
-
-    def _write(self, change: Change, rows: Floats) -> None:
-        count, width = change.group.numbers.shape
-        first = self._first(change.group)
-        table = self.evaluator.system.par[first : first + count * width]
-        table.reshape(count, width)[change.places] = rows

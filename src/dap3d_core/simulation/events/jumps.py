@@ -15,15 +15,15 @@ from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.model.state_layout import velocities_of
 from dap3d_core.result import EventRecord, information
-from dap3d_core.result.file.validate import are_events, is_number
+from dap3d_core.result.file.validate import are_events, check_forms, is_number
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.events.uncarried_contact import UncarriedContact
 
 #: Records of jumps that a result keeps.
 MOST_RECORDS = 1000
-#: Parts of the run: the time over which a rate is found by a difference; the time to zero of a
-#: switch below which it is on the side to which it goes; the same of a contact that has closed.
-DIFFERENCE, AT_ONCE, SOON = 1e-8, 1e-10, 1e-13
+#: Parts of the run: the time to zero of a switch below which it is on the side to which it goes;
+#: that of a contact that has closed.
+AT_ONCE, SOON = 1e-10, 1e-13
 #: What passes a stop by this part of the length of the scene has gone through it.
 PASSED = 1e-9
 #: Part of the exchanged energy above which work of jumps is no rounding.
@@ -41,7 +41,6 @@ class Jumps:
     """
 
     def __init__(self, evaluator: Evaluator) -> None:
-        """Args: the evaluator of the run."""
         self._evaluator = evaluator
         self.records: list[EventRecord] = []
         self.count, self.lose = 0, False
@@ -62,13 +61,11 @@ class Jumps:
         Raises:
             ValueError: it is not of that form.
         """
-        good = isinstance(stored, Mapping) and are_events(stored.get("records"))
-        if (
-            not good
-            or not is_number(stored.get("count"))
-            or stored.get("lose") not in (True, False)
-        ):
-            raise ValueError("what is known of its jumps is damaged")
+        check_forms(stored, {
+            "records": (are_events, "a list of jumps"),
+            "count": (is_number, "a number of jumps"),
+            "lose": (lambda value: isinstance(value, bool), "true or false"),
+        })  # fmt: skip
         self.records = [EventRecord(**one) for one in stored["records"]]
         self.count, self.lose = int(stored["count"]), stored["lose"]
 
@@ -139,7 +136,6 @@ class Jumps:
         """Let an event set velocities and states; u (13 n,) after it, and the work of that, J.
 
         Args:
-            integration: of the run, whose state they change.
             bodies: number of a body, from 0 -> (6,) its r_dot and omega, global axes; NaN leaves a
                 component to the joints.
             states: first place of a state among all -> its numbers.
@@ -271,11 +267,8 @@ class Jumps:
         """
         evaluator, work = self._evaluator, integration.work
         t, y = integration.t, integration.y
-        span = self._span_of(integration)
-        h = DIFFERENCE * span
-        slope, values = evaluator.slope(t, y), evaluator.switch_values(t, y)
-        later = evaluator.switch_values(t + h, y + h * slope)
-        rates = (later - values) / h
+        span, values = self._span_of(integration), evaluator.switch_values(t, y)
+        rates = self._contact.rates(t, y, span)
         at_once = np.abs(values) <= AT_ONCE * span * np.abs(rates)
         sides = np.where(at_once, np.sign(rates), jump.sides)
         work.switches[at.SIDE] = np.where(self._law.elements.is_jump, sides, 0.0)

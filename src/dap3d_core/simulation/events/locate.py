@@ -5,7 +5,7 @@ the number that is watched passes its level there, to the last digit of time. So
 step (its error, the constraints) holds of the state at an event.
 """
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -17,11 +17,11 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators import STEPPING, Integration, Status
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.result.event_record import EventRecord
-from dap3d_core.result.file.validate import are_events, are_texts, is_number
+from dap3d_core.result.file.validate import are_events, are_texts, check_forms, is_number, list_of
 from dap3d_core.result.post.smooth_parts import cubic
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event, Instant, Numbers, checked_events
-from dap3d_core.simulation.events.sampling import Sampler
+from dap3d_core.simulation.events.sampling import Sampler, is_sampling
 from dap3d_core.simulation.initial.released_joints import ReleasedJoints
 
 if TYPE_CHECKING:
@@ -97,54 +97,46 @@ class EventLocator:
             "sides": self._sides,
             "samplers": [sampler.state() for sampler in self._samplers],
             "inputs": self.evaluator.inputs.tolist(),
-            **self._joints_state(),
-        }
-
-    def _joints_state(self) -> dict[str, Any]:
-        """Which joints hold no more, and why, as plain data."""
-        if self.released is None:
-            return {}
-        pivots = self.evaluator.system.smallest.tolist()
-        released = sorted(self.released.names)
-        return {"joints": {"released": released, "pivots": pivots, **self._of_joints.state()}}
+            **({} if self.released is None else {"joints": {
+                "released": sorted(self.released.names),
+                "pivots": self.evaluator.system.smallest.tolist(),
+                **self._of_joints.state(),
+            }}),
+        }  # fmt: skip
 
     def _restore_joints(self, found: Any) -> None:
         assert self.released is not None
-        system, known = self.evaluator.system, self.compiled.model.breaks
-        names: Any = found.get("released") if isinstance(found, dict) else None
-        if not are_texts(names) or not set(names) <= set(known):
-            raise ValueError("the joints that have ended should be some of those that may")
-        if not _are_numbers(found.get("pivots"), (len(system.smallest),)):
-            raise ValueError("what is known of pivots is damaged")
-        self._of_joints.restore(found, set(known))
+        system, known = self.evaluator.system, set(self.compiled.model.breaks)
+        check_forms(found, {
+            "released": (lambda value: are_texts(value) and set(value) <= known, "joints that end"),
+            "pivots": (list_of(is_number, len(system.smallest)), "a number for each of the rows"),
+        })  # fmt: skip
+        self._of_joints.restore(found, known)
         self.released.put_back()
-        self.released.release(names)
+        self.released.release(found["released"])
         system.smallest[:] = found["pivots"]
 
-    def restore(self, found: Mapping[str, Any]) -> None:
+    def restore(self, found: Any) -> None:
         """Go on from what ``state`` gave.
 
         Raises:
             ValueError: it is not of that form.
         """
-        values: Any = found.get("values")
-        sides: Any = found.get("sides")
-        lengths = (0, len(self.events))
-        if not (_are_numbers(values, lengths) and _are_numbers(sides, (len(values),))):
-            raise ValueError("the values and sides of events should be a number for each")
-        if not (set(sides) <= {-1.0, 0.0, 1.0} and are_events(found.get("occurrences"))):
-            raise ValueError("what events have found is damaged")
+        count, inputs = len(self.events), len(self.compiled.model.input_names)
+        check_forms(found, {
+            "values": (list_of(is_number, 0, count), "a number for each event"),
+            "sides": (list_of({-1.0, 0.0, 1.0}.__contains__, 0, count), "a sign for each event"),
+            "occurrences": (are_events, "a list of events"),
+            "samplers": (list_of(is_sampling, count), "how each event changes"),
+            "inputs": (list_of(is_number, inputs), "a number for each input"),
+        })  # fmt: skip
+        if len(found["sides"]) != len(found["values"]):
+            raise ValueError("events should have as many sides as values")
         self.occurrences = [EventRecord(**one) for one in found["occurrences"]]
-        self._values, self._sides = list(values), list(sides)
-        states: Any = found.get("samplers")
-        if not (isinstance(states, list) and len(states) == len(self.events)):
-            raise ValueError("what is known of how events change is damaged")
-        for sampler, state in zip(self._samplers, states, strict=True):
+        self._values, self._sides = list(found["values"]), list(found["sides"])
+        for sampler, state in zip(self._samplers, found["samplers"], strict=True):
             sampler.restore(state)
-        inputs: Any = found.get("inputs")
-        if not _are_numbers(inputs, (len(self.compiled.model.input_names),)):
-            raise ValueError("the inputs that events have set should be a number for each")
-        self.evaluator.set_inputs(inputs)
+        self.evaluator.set_inputs(found["inputs"])
         if self.released is not None:
             self._restore_joints(found.get("joints"))
         if any(one.changes for one in self.occurrences):
@@ -470,7 +462,3 @@ class EventLocator:
 
             self.jumps = Jumps(self.evaluator)
         return self.jumps
-
-
-def _are_numbers(values: Any, lengths: Collection[int]) -> bool:
-    return isinstance(values, list) and len(values) in lengths and all(map(is_number, values))

@@ -93,6 +93,16 @@ def turning_points(values: Floats) -> list[tuple[float, float]]:
     return found
 
 
+def is_sampling(state: Any) -> bool:
+    """True for plain data that may be the state of a ``Sampler``."""
+    if not isinstance(state, list) or len(state) != 5:
+        return False
+    *optional, largest, windows = state
+    numbers = [x for x in optional if x is not None]
+    good = all(map(is_number, [*numbers, largest, windows]))
+    return good and min(largest, windows) >= 0.0 and (state[2] is None or state[2] > 0.0)
+
+
 def _polynomial(coefficients: list[float], x: float) -> float:
     """Value of a polynomial, its lowest coefficient first."""
     value = 0.0
@@ -139,21 +149,9 @@ class Sampler:
         return self.lost, self.touch, width, self._largest, self._kink_windows
 
     def restore(self, state: Any) -> None:
-        """Continue from what ``state`` gave.
-
-        Raises:
-            ValueError: it is not of that form.
-        """
-        if not (isinstance(state, list | tuple) and len(state) == 5):
-            raise ValueError("what is known of how an event changes should be five numbers")
-        optional, numbers = state[:3], state[3:]
-        good = all(x is None or is_number(x) for x in optional)
-        if not good or not all(is_number(x) and x >= 0.0 for x in numbers):
-            raise ValueError("what is known of how an event changes is damaged")
-        if state[2] is not None and not state[2] > 0.0:
-            raise ValueError("what is known of how an event changes is damaged")
-        self.lost, self.touch, width = optional
-        self._largest, self._kink_windows = float(numbers[0]), int(numbers[1])
+        """Continue from what ``state`` gave (``is_sampling``)."""
+        self.lost, self.touch, width, largest, windows = state
+        self._largest, self._kink_windows = float(largest), int(windows)
         self._width = self._widest if width is None else min(float(width), self._widest)
 
     def samples(

@@ -31,7 +31,6 @@ class UncarriedContact:
     """
 
     def __init__(self, evaluator: Evaluator, law: JumpLaw) -> None:
-        """Args: evaluator and law of jumps of a run."""
         self._evaluator, self._law = evaluator, law
         types: list[Any] = [switch.group.type_info for switch in evaluator.switches]
         bare = [info.type.kind == "joint" or "wrench" not in info.kernels for info in types]
@@ -44,7 +43,6 @@ class UncarriedContact:
         """Switches where contact stays at time t and integrated state y.
 
         Args:
-            t, y: time and state.
             sides: (switches,) +1 or -1, the side that each is on, or 0.
             span: s, of the run.
         """
@@ -57,7 +55,7 @@ class UncarriedContact:
             return []
         ahead = AHEAD * span
         later = y + ahead * self._evaluator.slope(t, y)
-        rates, rates_later = self._rates(t, y, span), self._rates(t, later, span)
+        rates, rates_later = self.rates(t, y, span), self.rates(t, later, span)
         candidates &= (sides < 0.0) | (rates <= 0.0)  # else it is on its way out
         closes = rates_later < -SWITCH_ROUNDING * size / (DIFFERENCE * span)
         stays = candidates & self.pushes & (closes | (sides < 0.0))
@@ -77,9 +75,10 @@ class UncarriedContact:
         finally:
             evaluator.states = states
         after = evaluator.coordinates.with_jump(y, jump.dv, states, 0.0)
-        return bool(self._rates(t, after, span)[k] >= STOPPED * rate)
+        return bool(self.rates(t, after, span)[k] >= STOPPED * rate)
 
-    def _rates(self, t: float, y: Floats, span: float) -> Floats:
+    def rates(self, t: float, y: Floats, span: float) -> Floats:
+        """(switches,) rates of the switches, by a difference over a part of the run."""
         evaluator, h = self._evaluator, DIFFERENCE * span
         later = evaluator.switch_values(t + h, y + h * evaluator.slope(t, y))
         return np.asarray((later - evaluator.switch_values(t, y)) / h)

@@ -115,13 +115,9 @@ class CreepMonitor:
     def __init__(self, model: Model, most: int) -> None:
         """Args: model; most: how many instants are reported at most."""
         self._model = model
-        self._elements = [(group, k) for group in model.friction for k in range(group.count)]
-        self._elements += [
-            (group, k)
-            for group in model.forces
-            if getattr(group.type_info.type, "regularised", "")
-            for k in range(group.count)
-        ]
+        smooth = (g for g in model.forces if getattr(g.type_info.type, "regularised", ""))
+        groups = (*model.friction, *smooth)
+        self._elements = [(group, k) for group in groups for k in range(group.count)]
         kept = min(MOST, max(FEWEST, WORK // max(1, len(self._elements))))
         self._stride, self._count = max(1, most // kept), 0
         self._kept: list[Arrays] = []

@@ -27,6 +27,7 @@ from dap3d_core.simulation.initial.least_change import (
     displacement,
     displacements,
     finite_rows,
+    largest_move,
     least_change,
     quadratic_part,
     scaled_system,
@@ -116,9 +117,7 @@ def correct_initial(
     Rows without a position level do not take part in the position stage.
 
     Args:
-        evaluator: the model.
         u: (13 n,) the state as given.
-        t: time, s.
         hold: bodies, from 1, that the position stage leaves where they are.
         metric: "unit" or "mass", see the head of this file.
         tolerance: of the position residual, of 1 m; TOLERANCE by default.
@@ -130,8 +129,7 @@ def correct_initial(
     if not evaluator.model.row_count:
         return Initial(u, before, before, 0, 0.0, 0.0)
     start = u
-    held = np.array(sorted(hold), dtype=np.int64)
-    u, passes = correct_positions(evaluator, u, t, held, metric, MOST_LEFT, tolerance)
+    u, passes = Assembly(evaluator, t, hold, metric, tolerance).close(u, MOST_LEFT)
     branch = _rotations(evaluator.model, start, u) if passes > MOST_PASSES else ""
     rows = finite_rows(evaluator, t, u)
     residual = rows.product(velocities_of(u)) - rows.nu
@@ -189,68 +187,126 @@ def correction_notes(initial: Initial, evaluator: Evaluator, scene: Scene) -> li
     return notes
 
 
-def correct_positions(
-    evaluator: Evaluator, u: Floats, t: float, held: Integers, metric: str = "unit",
-    leaves: int = 0, tolerance: float | None = None,
-) -> tuple[Floats, int]:  # fmt: skip
-    """The position stage of ``correct_initial``: the state with other r and p, and the passes.
+class Assembly:
+    """Positions of a model brought onto its constraints, by Newton's method.
 
-    leaves: how many singular poses it may leave, on one of several branches; passes are then more
-    than MOST_PASSES.
-
-    Raises:
-        AssemblyError: the residual does not vanish.
+    Rows without a position level do not take part.
     """
-    size, limit, before = evaluator.model.size, 1.0, np.inf
-    length, weight = evaluator.model.length, weights_of(evaluator)
-    fit = length * fit_of(evaluator.model)
-    closed = length * (TOLERANCE if tolerance is None else tolerance)
-    for passes in range(MOST_PASSES + 1):
-        rows = finite_rows(evaluator, t, u)
-        worst = largest(weight * rows.C)
-        stands = worst > 0.5 * before and worst <= max(fit, TOLERANCE * length)
-        if worst <= closed or stands:
-            return u, passes
-        before = worst
-        if passes == MOST_PASSES:
-            break
-        change = least_change(evaluator, rows, rows.C, t, held, metric).reshape(-1, 6)
-        limit = _step_limit(change, size)
-        u = displaced(u, -limit * change)
-    if leaves and not _without_gradient(evaluator, rows):
-        found = _leave(evaluator, u, rows, t, held, metric, leaves)
-        if found is not None:
-            return found[0], passes + found[1]
-    raise _failure(evaluator, rows, passes, held, is_far=limit < 1.0)
 
+    def __init__(
+        self,
+        evaluator: Evaluator,
+        t: float = 0.0,
+        hold: Collection[int] = (),
+        metric: str = "unit",
+        tolerance: float | None = None,
+    ) -> None:
+        """Args: as of ``correct_initial``."""
+        self.evaluator, self.t, self.metric = evaluator, t, metric
+        self.held = np.array(sorted(hold), dtype=np.int64)
+        self.closed = evaluator.model.length * (TOLERANCE if tolerance is None else tolerance)
 
-def _leave(
-    evaluator: Evaluator,
-    u: Floats,
-    rows: ConstraintRows,
-    t: float,
-    held: Integers,
-    metric: str,
-    leaves: int,
-) -> tuple[Floats, int] | None:
-    """Assemble from a singular pose; None where that fails."""
-    found = None
-    for change in _ways_out(evaluator, u, rows, t, held, metric):
-        away = displaced(u, _step_limit(change, evaluator.model.size) * change)
-        try:
-            closed, passes = correct_positions(evaluator, away, t, held, metric, leaves - 1)
-        except AssemblyError:
-            continue
-        if _is_farther(evaluator, closed, rows, t):
-            return closed, passes + 1
-        found = found or (closed, passes + 1)
-    return found
+    def close(self, u: Floats, leaves: int = 0) -> tuple[Floats, int]:
+        """The state with other r and p, and the passes.
+
+        leaves: how many singular poses it may leave, on one of several branches; passes are then
+        more than MOST_PASSES.
+
+        Raises:
+            AssemblyError: the residual does not vanish; the message has that of each joint.
+        """
+        evaluator, model, limit, before = self.evaluator, self.evaluator.model, 1.0, np.inf
+        weight, fit = weights_of(evaluator), model.length * fit_of(model)
+        for passes in range(MOST_PASSES + 1):
+            rows = finite_rows(evaluator, self.t, u)
+            worst = largest(weight * rows.C)
+            stands = worst > 0.5 * before and worst <= max(fit, TOLERANCE * model.length)
+            if worst <= self.closed or stands:
+                return u, passes
+            before = worst
+            if passes == MOST_PASSES:
+                break
+            change = least_change(evaluator, rows, rows.C, self.t, self.held, self.metric)
+            limit = _step_limit(change, model.size)
+            u = displaced(u, -limit * change)
+        if leaves and not _without_gradient(evaluator, rows):
+            found = self._leave(u, rows, leaves)
+            if found is not None:
+                return found[0], passes + found[1]
+        raise _failure(evaluator, rows, passes, self.held, is_far=limit < 1.0)
+
+    def _leave(self, u: Floats, rows: ConstraintRows, leaves: int) -> tuple[Floats, int] | None:
+        """Assemble from a singular pose; None where that fails."""
+        found = None
+        for change in self._ways_out(u, rows):
+            away = displaced(u, _step_limit(change, self.evaluator.model.size) * change)
+            try:
+                closed, passes = self.close(away, leaves - 1)
+            except AssemblyError:
+                continue
+            if _is_farther(self.evaluator, closed, rows, self.t):
+                return closed, passes + 1
+            found = found or (closed, passes + 1)
+        return found
+
+    def _ways_out(self, u: Floats, rows: ConstraintRows) -> Iterator[Floats]:
+        """Displacements (n, 6) from a singular pose that close its gap, the smallest first.
+
+        No small change closes a gap there to first order: of a mechanism drawn straight, for
+        example. Along velocities v that the rows allow C changes by -gamma(v) s^2 / 2: the
+        direction in which that closes the gap with the least motion leads away. Of those that close
+        it equally well, and of the two signs, the one in which the first component that can be
+        largest is positive.
+        """
+        if len(rows.C) > DENSE_ROWS:
+            return
+        evaluator, held = self.evaluator, self.held
+        D, gap = scaled_system(evaluator, rows, rows.C, held, self.metric)
+        is_free = np.repeat(~np.isin(np.arange(1, evaluator.model.body_count + 1), held), 6)
+        left, values, right = np.linalg.svd(D[:, is_free])
+        rank = _rank(values, RCOND)
+        beyond = gap - left[:, :rank] @ (left[:, :rank].T @ gap)
+        distance = float(np.linalg.norm(beyond))
+        if distance < OPEN * np.linalg.norm(gap) or not 0 < len(right) - rank <= MOST_FREE:
+            return
+        motions = np.zeros((len(right) - rank, len(is_free)))
+        motions[:, is_free] = right[rank:]
+        closing = self._closing(u, rows, motions, beyond / distance)
+        rates, directions = np.linalg.eigh(closing)
+        least = CLOSING * max(-float(rates[0]), evaluator.model.length)
+        for _ in range(MOST_WAYS):
+            if not rates.size or not rates[-1] > least:
+                return
+            equal = rates >= (1.0 - TIED) * rates[-1]
+            yield displacements(
+                evaluator,
+                _first_of(directions[:, equal].T @ motions) * (2.0 * distance / rates[-1]) ** 0.5,
+                self.metric,
+            )
+            rates, directions = rates[~equal], directions[:, ~equal]
+
+    def _closing(self, u: Floats, rows: ConstraintRows, ways: Floats, direction: Floats) -> Floats:
+        """(f, f) the quadratic form by which motions along ways (f, 6 n) close a gap, rows (m,)."""
+        still, evaluator, metric = at_rest(u), self.evaluator, self.metric
+
+        def closed(x: Floats) -> float:
+            gamma = quadratic_part(
+                evaluator, still, displacements(evaluator, x, metric).ravel(), self.t
+            )
+            return float(direction @ scaled_system(evaluator, rows, gamma, self.held, metric)[1])
+
+        f = len(ways)
+        form = np.zeros((f, f))
+        for i in range(f):
+            for j in range(i + 1):
+                both = closed(ways[i] + ways[j]) - closed(ways[i] - ways[j])
+                form[i, j] = form[j, i] = both / 4.0
+        return form
 
 
 def _step_limit(change: Floats, size: float) -> float:
     """The part of a change (n, 6) that a pass makes."""
-    shift = float(np.max(np.linalg.norm(change[:, :3], axis=1)))
-    turn = float(np.max(np.linalg.norm(change[:, 3:], axis=1)))
+    shift, turn = largest_move(change)
     shift_limit = MOST_SHIFT * size / shift if shift else 1.0
     turn_limit = MOST_TURN / turn if turn else 1.0
     return min(1.0, shift_limit, turn_limit)
@@ -336,58 +392,6 @@ def _without_gradient(evaluator: Evaluator, rows: ConstraintRows) -> str:
     return f"row {row} of {_cut(evaluator.model.joint_names[k], 30)}"
 
 
-def _cut(words: str, width: int) -> str:
-    return words if len(words) <= width else f"{words[: width - 3]}..."
-
-
-def _ways_out(
-    evaluator: Evaluator, u: Floats, rows: ConstraintRows, t: float, held: Integers, metric: str
-) -> Iterator[Floats]:
-    """Displacements (n, 6) from a singular pose that close its gap, the smallest first.
-
-    No small change closes a gap there to first order: of a mechanism drawn straight, for example.
-    Along velocities v that the rows allow C changes by -gamma(v) s^2 / 2: the direction in which
-    that closes the gap with the least motion leads away. Of those that close it equally well, and
-    of the two signs, the one in which the first component that can be largest is positive.
-    """
-    if len(rows.C) > DENSE_ROWS:
-        return
-    D, gap = scaled_system(evaluator, rows, rows.C, held, metric)
-    is_free = np.repeat(~np.isin(np.arange(1, evaluator.model.body_count + 1), held), 6)
-    left, values, right = np.linalg.svd(D[:, is_free])
-    rank = _rank(values, RCOND)
-    beyond = gap - left[:, :rank] @ (left[:, :rank].T @ gap)
-    distance = float(np.linalg.norm(beyond))
-    if distance < OPEN * np.linalg.norm(gap) or not 0 < len(right) - rank <= MOST_FREE:
-        return
-    motions = np.zeros((len(right) - rank, len(is_free)))
-    motions[:, is_free] = right[rank:]
-    closing = _closing(evaluator, u, rows, t, held, metric, motions, beyond / distance)
-    rates, directions = np.linalg.eigh(closing)
-    least = CLOSING * max(-float(rates[0]), evaluator.model.length)
-    for _ in range(MOST_WAYS):
-        if not rates.size or not rates[-1] > least:
-            return
-        equal = rates >= (1.0 - TIED) * rates[-1]
-        yield displacements(
-            evaluator,
-            _first_of(directions[:, equal].T @ motions) * (2.0 * distance / rates[-1]) ** 0.5,
-            metric,
-        )
-        rates, directions = rates[~equal], directions[:, ~equal]
-
-
-def _first_of(directions: Floats) -> Floats:
-    """A unit vector (6 n,) of the space of orthonormal ones (k, 6 n), the same on any computer."""
-    size = np.sum(directions**2, axis=0)
-    k = int(np.argmax(size >= (1.0 - TIED) * np.max(size)))
-    return directions[:, k] @ directions / size[k] ** 0.5
-
-
-def _rank(values: Floats, part: float) -> int:
-    return int(np.sum(values > part * np.max(values, initial=0.0)))
-
-
 def _is_farther(evaluator: Evaluator, u: Floats, other: ConstraintRows, t: float) -> bool:
     """True if the rows of a state are clearly more independent than those of a singular pose."""
     parts = ((finite_rows(evaluator, t, u), REGULAR), (other, RCOND))
@@ -399,30 +403,19 @@ def _is_farther(evaluator: Evaluator, u: Floats, other: ConstraintRows, t: float
     return ranks[0] > ranks[1]
 
 
-def _closing(
-    evaluator: Evaluator,
-    u: Floats,
-    rows: ConstraintRows,
-    t: float,
-    held: Integers,
-    metric: str,
-    ways: Floats,
-    direction: Floats,
-) -> Floats:
-    """(f, f) the quadratic form by which motions along ways (f, 6 n) close a gap, rows (m,)."""
-    still = at_rest(u)
+def _cut(words: str, width: int) -> str:
+    return words if len(words) <= width else f"{words[: width - 3]}..."
 
-    def closed(x: Floats) -> float:
-        gamma = quadratic_part(evaluator, still, displacements(evaluator, x, metric).ravel(), t)
-        return float(direction @ scaled_system(evaluator, rows, gamma, held, metric)[1])
 
-    f = len(ways)
-    form = np.zeros((f, f))
-    for i in range(f):
-        for j in range(i + 1):
-            both = closed(ways[i] + ways[j]) - closed(ways[i] - ways[j])
-            form[i, j] = form[j, i] = both / 4.0
-    return form
+def _first_of(directions: Floats) -> Floats:
+    """A unit vector (6 n,) of the space of orthonormal ones (k, 6 n), the same on any computer."""
+    size = np.sum(directions**2, axis=0)
+    k = int(np.argmax(size >= (1.0 - TIED) * np.max(size)))
+    return directions[:, k] @ directions / size[k] ** 0.5
+
+
+def _rank(values: Floats, part: float) -> int:
+    return int(np.sum(values > part * np.max(values, initial=0.0)))
 
 
 def _rotations(model: Model, start: Floats, end: Floats) -> str:

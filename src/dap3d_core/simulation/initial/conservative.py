@@ -32,9 +32,7 @@ def is_conservative(evaluator: Evaluator, u: Floats) -> bool:
 
     Contacts, which are open here, and friction that is one, may do work all the same.
 
-    Args:
-        evaluator: the model.
-        u: (13 n,) a state about which the forces are tried.
+    u: (13 n,) a state about which the forces are tried.
     """
     model = evaluator.model
     driven = any(np.any(g.functions > 0) for g in model.joints)

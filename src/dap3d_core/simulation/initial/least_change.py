@@ -172,6 +172,13 @@ def displaced(u: Floats, change: Floats) -> Floats:
     return join(r + change[:, :3], p / np.linalg.norm(p, axis=1, keepdims=True), v, w)
 
 
+def largest_move(change: Floats) -> tuple[float, float]:
+    """Largest displacement, m, and rotation, rad, of a body in a change (n, 6) or (6 n,)."""
+    moves = change.reshape(-1, 2, 3)
+    shift, turn = np.max(np.linalg.norm(moves, axis=2), axis=0, initial=0.0).tolist()
+    return shift, turn
+
+
 def displacement(u: Floats, other: Floats) -> tuple[Floats, Floats]:
     """Displacements, m, and rotation vectors, rad, global axes, (n, 3), from a state to another."""
     r, p, _, _ = split(u)

@@ -93,11 +93,7 @@ class SingularStart:
 def singular_start(evaluator: Evaluator, u: Floats, rank: Rank, t: float) -> SingularStart | None:
     """Description of a singular start u (13 n,); None if its pose is not singular.
 
-    Args:
-        evaluator: the model.
-        u: the state, corrected.
-        rank: of its constraints; some of them are redundant.
-        t: time, s.
+    rank: of its constraints; some of them are redundant.
     """
     if not _loses_rank(evaluator, u, rank, t):
         return None

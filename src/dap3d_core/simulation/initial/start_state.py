@@ -86,9 +86,7 @@ Start = str | Result | tuple[Result, float | None] | HasNamedState | StartState
 def start_state(start: Any, model: Model, checked: ValidatedScene) -> StartState:
     """The state that a start means for a model whose bodies have the same names.
 
-    Args:
-        start: a result, a result and a time, an equilibrium, or a state of the model.
-        model, checked: what is to start.
+    start: a result, a result and a time, an equilibrium, or a state of the model.
 
     Raises:
         SceneError: it is nothing of these, a body is missing in it, the result is empty, or has no
@@ -200,8 +198,7 @@ def _state_of_result(result: Result, t: Any, model: Model, checked: ValidatedSce
     notes = [information(f"the start is the state of {title} at t = {time:.9g} s; the run begins "
              "at t = 0, and so do functions of time")]  # fmt: skip
     if before != after:
-        _refuse_jumps(result, before, after)
-        _refuse_turns(result, before, after)
+        _refuse_between(result, before, after)
         notes.append(
             information(
                 f"the start was interpolated between the reported instants "
@@ -253,24 +250,19 @@ def _states_at(result: Result, before: int, after: int, fraction: float) -> dict
     return dict(zip(names, values.tolist(), strict=True))
 
 
-def _refuse_jumps(result: Result, before: int, after: int) -> None:
-    """SceneError where velocities jumped between two reported instants: nothing leads across."""
-    first, last = float(result.t[before]), float(result.t[after])
-    for jump in result.events:
-        if jump.u_after is not None and first < jump.t <= last:
-            raise _mistake(
-                result.record.title or "the result",
-                f"velocities jumped at t = {jump.t:.9g} s, between the reported instants "
-                f"{first:.9g} s and {last:.9g} s; give one of these as the time of the start",
-            )
+def _refuse_between(result: Result, before: int, after: int) -> None:
+    """SceneError where nothing leads across from one reported instant to the next.
 
-
-def _refuse_turns(result: Result, before: int, after: int) -> None:
-    """SceneError where a body turns by more than half a turn between two reported instants.
-
-    The counted angles say so where a body rests at both.
+    Velocities jump there, or a body turns by more than half a turn: the counted angles say so where
+    it rests at both.
     """
     first, last = float(result.t[before]), float(result.t[after])
+    between = f"between the reported instants {first:.9g} s and {last:.9g} s"
+    remedy = "give one of these as the time of the start"
+    title = result.record.title or "the result"
+    for jump in result.events:
+        if jump.u_after is not None and first < jump.t <= last:
+            raise _mistake(title, f"velocities jumped at t = {jump.t:.9g} s, {between}; {remedy}")
     speed = np.linalg.norm(result.w[[before, after]], axis=-1).max(axis=0)
     fastest = int(np.argmax(speed))
     turn = np.abs(result.arrays.angles[after] - result.arrays.angles[before])
@@ -281,10 +273,9 @@ def _refuse_turns(result: Result, before: int, after: int) -> None:
     else:
         return
     raise _mistake(
-        result.record.title or "the result",
-        f"{turns} by more than half a turn between the reported instants {first:.9g} s and "
-        f"{last:.9g} s: the pose is not known there; give one of these as the time of the start, "
-        "or report more often",
+        title,
+        f"{turns} by more than half a turn {between}: the pose is not known there; {remedy}, or "
+        "report more often",
     )
 
 

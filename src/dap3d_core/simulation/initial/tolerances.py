@@ -25,9 +25,7 @@ RESOLVED = 1e3
 def resolved_atol(atol: Any, evaluator: Evaluator) -> float | dict[str, float]:
     """Absolute tolerances as a run uses them: one for all, or by quantity.
 
-    Args:
-        atol: as given: None, a number, or a table of some quantities.
-        evaluator: what evaluates the model.
+    atol: as given: None, a number, or a table of some quantities.
     """
     if isinstance(atol, (int, float)):
         return float(atol)

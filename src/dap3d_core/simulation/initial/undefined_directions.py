@@ -26,7 +26,6 @@ def undefined_directions(scene: Scene, model: Model, u: Floats, size: float) -> 
 
     Args:
         scene: for the places of the mistakes.
-        model: the model.
         u: (13 n,) a state, such as the start of a run.
         size: a length of the model, m.
     """

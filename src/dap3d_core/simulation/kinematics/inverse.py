@@ -12,14 +12,12 @@ from dap3d_core.formulations.common.friction import PASSES, forces_by
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result import Result, RunMetadata, RunStatistics, information
-from dap3d_core.result.arrays import Arrays, summary_of
-from dap3d_core.result.post.point_motion import kinetic_energy
+from dap3d_core.result import Result, RunStatistics, information
+from dap3d_core.result.arrays import Arrays
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError, refuse_collisions
-from dap3d_core.simulation.failure.monitors import UnilateralMonitor
-from dap3d_core.simulation.kinematics.kinematics import check_output
+from dap3d_core.simulation.kinematics.kinematics import check_output, result_of
 from dap3d_core.simulation.kinematics.motion_data import (
     Motion,
     misfit_notes,
@@ -58,7 +56,6 @@ PASS_SETTLED, UNSETTLED, DEPTH = 1e-12, 1e-9, 8
 RANK = 1e-9
 
 
-@attrs.define(eq=False)
 class Balance:
     """The equations M v_dot - g = D^T lambda + B tau of one instant, and their solution.
 
@@ -69,20 +66,19 @@ class Balance:
         shares: whether forces of contacts are not unique.
     """
 
-    t: float
-    rows: ChosenRows
-    held: Flags
-    actuators: Sequence[Actuator]
-    wrenches: Floats
-    contacts: ContactForces | None = None
-    closed: Closed | None = None
-    tau: Floats = attrs.field(factory=lambda: np.zeros(0), init=False)
-    Lam: Floats = attrs.field(factory=lambda: np.zeros(0), init=False)
-    left: Floats = attrs.field(factory=lambda: np.zeros(0), init=False)
-    forces: Floats = attrs.field(factory=lambda: np.zeros(0), init=False)
-    side: Floats = attrs.field(factory=lambda: np.zeros(0), init=False)
-    rank: int = attrs.field(default=0, init=False)
-    shares: bool = attrs.field(default=False, init=False)
+    def __init__(
+        self,
+        t: float,
+        rows: ChosenRows,
+        held: Flags,
+        actuators: Sequence[Actuator],
+        wrenches: Floats,
+        closed: Closed | None,
+    ) -> None:
+        self.t, self.rows, self.held = t, rows, held
+        self.actuators, self.wrenches, self.closed = actuators, wrenches, closed
+        self.tau = self.Lam = self.left = self.forces = self.side = np.zeros(0)
+        self.rank, self.shares = 0, False
 
     def solve(self, needed: Floats) -> None:
         """Find forces and multipliers that give forces (6 n,) on the bodies.
@@ -91,14 +87,14 @@ class Balance:
             SimulationError: contacts leave their cones in all that was found.
         """
         rows, count, closed = self.rows, len(self.actuators), self.closed
-        if closed is None or self.contacts is None:
+        if closed is None:
             forces, self.rank = self._least(self.wrenches, needed)
             wrenches = self.wrenches
         else:
             wrenches, needed = np.hstack([self.wrenches, closed.wrenches]), needed - closed.known
             forces, rank = self._least(wrenches, needed)
             A, side = rows.free.T @ wrenches, rows.free.T @ needed
-            forces = self.contacts.within(closed, self.t, A, side, forces)
+            forces = closed.contacts.within(closed, self.t, A, side, forces)
             self.rank, self.shares = count, rank < A.shape[1]
             self.forces, self.side = forces, side
         self.tau, self.Lam = forces[:count], np.zeros(len(self.held))
@@ -107,8 +103,8 @@ class Balance:
         for force, actuator in zip(self.tau, self.actuators, strict=True):
             if isinstance(actuator, DriverActuator):
                 self.Lam[actuator.row] = force / actuator.size(rows.all_rows)
-        if closed is not None and self.contacts is not None:
-            first = len(self.held) - 3 * self.contacts.table.count
+        if closed is not None:
+            first = len(self.held) - 3 * closed.contacts.table.count
             self.Lam[first + np.array(closed.Lam, dtype=int)] = closed.scale * forces[count:]
 
     def _least(self, wrenches: Floats, needed: Floats) -> tuple[Floats, int]:
@@ -241,40 +237,31 @@ def _solved(
     evaluator.start(float(motion.t[0]), motion.u[0])
     contacts = ContactForces(evaluator) if model.contact_count else None
     forces = _forces(evaluator, motion, chosen, held, contacts, progress)
-    kinetic = kinetic_energy(summary := summary_of(model), motion.u)
     position, velocity, acceleration = forces.residuals.T
     arrays = Arrays(
-        motion.t.copy(), motion.u, motion.v_dot, forces.Lam, kinetic - kinetic[0],
+        motion.t.copy(), motion.u, motion.v_dot, forces.Lam, np.zeros(len(motion.t)),
         forces.potential, position, velocity, acceleration, forces.angles, forces.states,
         np.tile(model.input_values, (len(motion.t), 1)),
     )  # fmt: skip
-    pulling = UnilateralMonitor(model)
-    pulling.update(arrays)
     notes = [*compiled.notes, *misfit_notes(motion.misfit), *_notes(evaluator, chosen, forces),
              *held_states(model), *(contacts.notes() if contacts else [])]  # fmt: skip
-    about = RunMetadata(
-        scene_text=compiled.scene_text,
-        stats=RunStatistics(
-            wall_time_s=time.perf_counter() - started, compile_time_s=compiled.compile_time
-        ),
-        method=compiled.method,
-        integrator=NAME,
-        notes=[*notes, *pulling.notes()],
-        types=compiled.types,
-        settings={
+    return result_of(
+        compiled,
+        arrays,
+        notes,
+        {
             "t_end": float(motion.t[-1]),
             "actuators": ", ".join(actuator.name for actuator in chosen),
             "actuation_units": ", ".join(forces.units),
-            "length": model.length,
-            "project": True,
             "correct": False,
             "rank": 6 * model.body_count - forces.freedoms,
-            "conservative": False,
-            "work_from_energy": True,
         },
+        stats=RunStatistics(
+            wall_time_s=time.perf_counter() - started, compile_time_s=compiled.compile_time
+        ),
+        integrator=NAME,
         actuation={a.name: forces.tau[:, k] for k, a in enumerate(chosen)},
     )
-    return Result(summary, arrays, about, lambda: (model, lambda: compiled.evaluator))
 
 
 def _forces(
@@ -311,7 +298,7 @@ def _forces(
         closed = contacts.at(t, u) if contacts else None
         if closed is not None:
             out.states[k] = closed.states
-        balance = Balance(t, rows, held, actuators, wrenches, contacts, closed)
+        balance = Balance(t, rows, held, actuators, wrenches, closed)
         _solve(balance, evaluator, u, needed)
         out.tau[k], out.Lam[k] = balance.tau, balance.Lam
         v = u[-6 * model.body_count :]
@@ -330,14 +317,14 @@ def _solve(balance: Balance, evaluator: Evaluator, u: Floats, needed: Floats) ->
     Raises:
         SimulationError: these forces, and multipliers, do not settle.
     """
-    closed, contacts, t, states = balance.closed, balance.contacts, balance.t, evaluator.states
+    closed, t, states = balance.closed, balance.t, evaluator.states
     balance.solve(needed)
     guess, taken, rests, rest = balance.Lam, list[Floats](), list[Floats](), np.zeros(0)
     model = evaluator.model
     depends = len(model.iterated_forces) > model.contact_count or bool(model.loaded_contacts)
     for _ in range(PASSES if depends else 0):
-        if closed is not None and contacts is not None:
-            closed.take_loads(contacts.table, guess)
+        if closed is not None:
+            closed.take_loads(guess)
             evaluator.states = closed.loaded
         evaluator.place(t, u)
         balance.solve(needed - forces_by(t, evaluator.system, evaluator.loops, guess)[6:])
@@ -351,8 +338,8 @@ def _solve(balance: Balance, evaluator: Evaluator, u: Floats, needed: Floats) ->
             f"forces that depend on reactions of joints do not settle at t = {t:.6g} s: they raise "
             "their own load by more than that load"
         )
-    if closed is not None and contacts is not None:
-        contacts.take(closed, t, balance.forces, balance.side)
+    if closed is not None:
+        closed.contacts.take(closed, t, balance.forces, balance.side)
 
 
 def _extrapolated(given: Floats, taken: list[Floats], rests: list[Floats]) -> Floats:

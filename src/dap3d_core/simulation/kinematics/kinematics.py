@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import attrs
@@ -12,7 +12,7 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Computed, Result, RunMetadata, RunStatistics, information
-from dap3d_core.result.arrays import arrays_of, summary_of
+from dap3d_core.result.arrays import Arrays, arrays_of, summary_of
 from dap3d_core.result.file.atomic_write import check_target, check_utf8
 from dap3d_core.result.post.point_motion import kinetic_energy
 from dap3d_core.scene import Mistake, Scene, SceneError, Simulation
@@ -34,6 +34,7 @@ from dap3d_core.simulation.kinematics.driver_coordinate import (
 from dap3d_core.simulation.kinematics.path import KinematicPath, PathEndError, Pose
 from dap3d_core.simulation.kinematics.pose_equations import held_states, required_forces
 from dap3d_core.simulation.redundancy.freedoms import freedoms_left, motion_words
+from dap3d_core.simulation.redundancy.shared_reactions import refuse_shared, shared_laws
 from dap3d_core.simulation.settings import compile_exact, report_times, settings_of
 
 Progress = Callable[[float, float], None]
@@ -125,6 +126,34 @@ def check_output(output: str | os.PathLike[str] | None, *, force: bool) -> None:
         check_target(output, force)
 
 
+def result_of(
+    compiled: CompiledModel,
+    arrays: Arrays,
+    notes: Sequence[str],
+    settings: dict[str, Any],
+    **record: Any,
+) -> Result:
+    """The result of a motion that was found, not integrated: its work is that of kinetic energy.
+
+    settings, record: of the metadata.
+    """
+    model, summary = compiled.model, summary_of(compiled.model)
+    kinetic = kinetic_energy(summary, arrays.u)
+    pulling = UnilateralMonitor(model)
+    pulling.update(arrays)
+    of_all = {"length": model.length, "project": True, "conservative": False}
+    about = RunMetadata(
+        scene_text=compiled.scene_text,
+        method=compiled.method,
+        notes=[*notes, *pulling.notes()],
+        types=compiled.types,
+        settings=settings | of_all | {"work_from_energy": True},
+        **record,
+    )
+    arrays = attrs.evolve(arrays, work=kinetic - kinetic[0])
+    return Result(summary, arrays, about, lambda: (model, lambda: compiled.evaluator))
+
+
 class _Kinematics:
     """One analysis: the rows of its instants, notes and counts."""
 
@@ -209,45 +238,31 @@ class _Kinematics:
         if not self.rows:
             return None
         notes = [*self.notes, *self._branch_notes()]
-        compiled, model = self.compiled, self.evaluator.model
         rows = np.array(self.rows)
         rows = rows[np.argsort(rows[:, 0], kind="stable")]
-        summary = summary_of(model)
-        arrays = arrays_of(rows, summary)
-        kinetic = kinetic_energy(summary, arrays.u)
-        arrays = attrs.evolve(arrays, work=kinetic - kinetic[0])
-        pulling = UnilateralMonitor(model)
-        pulling.update(arrays)
-        notes += pulling.notes()
         if isinstance(error, SimulationError):
             notes.append(str(error))
-        about = RunMetadata(
-            scene_text=compiled.scene_text,
+        return result_of(
+            self.compiled,
+            arrays_of(rows, summary_of(self.evaluator.model)),
+            notes,
+            {
+                "t_end": float(self.times[-1]),
+                "dt": self.settings.dt if self.coordinate is None else None,
+                **self._over(),
+                "correct": self.times[0] == 0.0,
+                "rank": self.rank,
+            },
             stats=RunStatistics(
                 steps=sum(path.steps for path in self.paths),
                 rejected=sum(path.rejected for path in self.paths),
                 rhs=sum(path.evaluations for path in self.paths),
                 wall_time_s=time.perf_counter() - self.started,
-                compile_time_s=compiled.compile_time,
+                compile_time_s=self.compiled.compile_time,
             ),
             status=status,
-            method=compiled.method,
             integrator=NAME,
-            notes=notes,
-            types=compiled.types,
-            settings={
-                "t_end": float(self.times[-1]),
-                "dt": self.settings.dt if self.coordinate is None else None,
-                **self._over(),
-                "length": model.length,
-                "project": True,
-                "correct": self.times[0] == 0.0,
-                "rank": self.rank,
-                "conservative": False,
-                "work_from_energy": True,
-            },
         )
-        return Result(summary, arrays, about, lambda: (model, lambda: compiled.evaluator))
 
     # ------------------------------------------------------------------ the start
 
@@ -275,13 +290,8 @@ class _Kinematics:
             raise RedundantError(words)
         if redundancy.rank.dof:
             raise SimulationError(self._freedoms(start))
-        if redundancy.rank.redundant and compiled.model.iterated_forces:
-            from dap3d_core.simulation.redundancy import shared_reactions
-
-            laws = shared_reactions.shared_laws(
-                compiled.checked, self.evaluator, start.u, redundancy
-            )
-            shared_reactions.refuse_shared(laws, self.evaluator)
+        laws = shared_laws(compiled.checked, self.evaluator, start.u, redundancy)
+        refuse_shared(laws, self.evaluator)
         if redundancy.rank.redundant:
             self.notes.append(
                 f"{words}. The motion is unique; reactions in these joints are not (reported are "

@@ -102,7 +102,6 @@ def motion_on(
     """The motion of a scene nearest to one that is given.
 
     Args:
-        evaluator: of the scene.
         given: the motion.
         start: (13 n,) a pose near the first one, for data.
         chosen: (rows,) the constraint rows that hold; others belong to actuators.

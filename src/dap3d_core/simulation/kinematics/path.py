@@ -150,7 +150,7 @@ class KinematicPath:
             x + (x - z) / (ratio - 1.0)
             for x, z, ratio in zip(near, far, (64.0, 64.0, 16.0), strict=True)
         )
-        r, p = (part.reshape(-1, k) for part, k in zip(_parts(y), (3, 4), strict=True))
+        r, p = _parts(y)
         v, a = _velocity(y, y_dot, y_ddot)
         u = join(r, p / np.linalg.norm(p, axis=1, keepdims=True), *_by_body(v))
         return Pose(t, u, a, self._rows(t, u)), True
@@ -203,7 +203,7 @@ class KinematicPath:
             y = self._dense(t)
         else:
             y = _interpolated(self.before, self.pose, t)[0]
-        r, p = (part.reshape(-1, k) for part, k in zip(_parts(y), (3, 4), strict=True))
+        r, p = _parts(y)
         p = p / np.linalg.norm(p, axis=1, keepdims=True)
         return self._completed(t, self._closed(t, join(r, p, 0.0 * r, 0.0 * r)))
 
@@ -281,7 +281,7 @@ class KinematicPath:
 
     def _rates(self, t: float, y: Floats) -> Floats:
         """dy/dt of y = (r, p)."""
-        r, p = (part.reshape(-1, k) for part, k in zip(_parts(y), (3, 4), strict=True))
+        r, p = _parts(y)
         unit = p / np.linalg.norm(p, axis=1, keepdims=True)
         rows = self._rows(float(t), join(r, unit, 0.0 * r, 0.0 * r))
         v, w = _by_body(rows.solve(rows.rows.nu))
@@ -294,17 +294,16 @@ def _by_body(v: Floats) -> tuple[Floats, Floats]:
 
 
 def _parts(y: Floats) -> tuple[Floats, Floats]:
-    """R and p of y = (r, p)."""
+    """R (n, 3) and p (n, 4) of y = (r, p)."""
     n = len(y) // 7
-    return y[: 3 * n], y[3 * n :]
+    return y[: 3 * n].reshape(-1, 3), y[3 * n :].reshape(-1, 4)
 
 
 def _velocity(y: Floats, y_dot: Floats, y_ddot: Floats) -> tuple[Floats, Floats]:
     """(6 n,) velocities and accelerations of y = (r, p) and its derivatives."""
     (_, p), (v, rate), (a, second) = (_parts(part) for part in (y, y_dot, y_ddot))
-    p, rate, second = (part.reshape(-1, 4) for part in (p, rate, second))
     w, alpha = angular_velocities(p, rate), angular_velocities(p, second)  # G_dot p_dot = 0
-    first, other = (np.hstack([x.reshape(-1, 3), z]).ravel() for x, z in ((v, w), (a, alpha)))
+    first, other = (np.hstack([x, z]).ravel() for x, z in ((v, w), (a, alpha)))
     return first, other
 
 

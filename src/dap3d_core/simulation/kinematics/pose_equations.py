@@ -155,8 +155,6 @@ def required_forces(evaluator: Evaluator, t: float, u: Floats, v_dot: Floats) ->
     """(6 n,) force and moment on each body that joints have to give: M v_dot - g.
 
     Args:
-        evaluator: of the model.
-        t: time, s.
         u: (13 n,) state.
         v_dot: (6 n,) accelerations.
     """

@@ -138,7 +138,8 @@ def actuators_of(
         if name in [actuator.name for actuator in found]:
             mistakes.append(Mistake("actuators", name, "is named twice"))
         elif name in drivers:
-            found.append(_driver(evaluator, name))
+            row = evaluator.model.joint_start[evaluator.model.joint_names.index(name)]
+            found.append(DriverActuator(name, int(row)))
         elif name in forces:
             force = ForceActuator(evaluator, name, *forces[name])
             scene, field = compiled.scene, field_of(forces[name][0])
@@ -155,11 +156,6 @@ def actuators_of(
     if mistakes:
         raise SceneError(mistakes)
     return found
-
-
-def _driver(evaluator: Evaluator, name: str) -> DriverActuator:
-    model = evaluator.model
-    return DriverActuator(name, int(model.joint_start[model.joint_names.index(name)]))
 
 
 def _actuating_forces(evaluator: Evaluator) -> dict[str, tuple[Group, int]]:
@@ -234,6 +230,7 @@ class Closed:
     """The contacts that are closed at one instant.
 
     Attributes:
+        contacts: what found them.
         wrenches: (6 n, k) of their unknown forces, of one each.
         known: (6 n,) friction of a size of its own that slides.
         cones: contact -> the cone that its forces are in, with those of what resists at it.
@@ -245,6 +242,7 @@ class Closed:
         load: contact -> by what that size is multiplied: the load that its joint was found to have.
     """
 
+    contacts: "ContactForces"
     wrenches: Floats
     known: Floats
     cones: dict[int, Cone]
@@ -254,9 +252,9 @@ class Closed:
     loaded: Floats
     load: dict[int, float]
 
-    def take_loads(self, table: ContactTable, Lam: Floats) -> None:
+    def take_loads(self, Lam: Floats) -> None:
         """Take the loads of joints from multipliers (rows,)."""
-        for c, (rows, pushes) in table.loads.items():
+        for c, (rows, pushes) in self.contacts.table.loads.items():
             size = max(Lam[rows[0]], 0.0) if pushes else np.linalg.norm(Lam[rows])
             self.load[c] = float(size)
 
@@ -327,7 +325,7 @@ class ContactForces:
                 some[table.way[c]] = table.speed[c] * way @ s.frames[c, across]
         wrenches = np.array(columns).reshape(-1, len(s.v)).T
         load = {c: np.inf if c in table.loads else 1.0 for c in cones}  # unknown at first
-        return Closed(wrenches, known, cones, places, scale, states, loaded, load)
+        return Closed(self, wrenches, known, cones, places, scale, states, loaded, load)
 
     def within(self, closed: Closed, t: float, A: Floats, side: Floats, x: Floats) -> Floats:
         """Forces x (k,) with A x as near to side: within the cones, where they leave a choice.

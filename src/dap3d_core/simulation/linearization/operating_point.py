@@ -27,7 +27,8 @@ from dap3d_core.simulation.initial_state import start_notes
 from dap3d_core.simulation.linearization.scaled_equations import ScaledEquations, scaled_equations
 from dap3d_core.simulation.linearization.steady_motion import SteadyFrames, steady_frames
 from dap3d_core.simulation.linearization.tangent import TangentMatrices, tangent_matrices
-from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of
+from dap3d_core.simulation.redundancy.redundancy import redundancy_of
+from dap3d_core.simulation.redundancy.shared_reactions import refuse_shared, shared_laws
 from dap3d_core.simulation.settings import compile_exact
 
 #: Residuals of the constraints beyond this make a state unfit, in m and m/s of an ordinary scene.
@@ -51,7 +52,6 @@ class OperatingPoint:
         states: (s,) states of elements.
         tangent: derivatives of the equations of motion.
         frames: axes in which the equations are written.
-        redundancy: rank of the constraints.
         notes: choices and warnings.
         rank: of all rows, those of closed contacts too.
     """
@@ -62,7 +62,6 @@ class OperatingPoint:
     states: Floats
     tangent: TangentMatrices
     frames: SteadyFrames
-    redundancy: Redundancy
     notes: tuple[str, ...]
     rank: Rank
 
@@ -147,18 +146,13 @@ def operating_point(
             "linearisation does not know states whose rates depend on the reactions of joints: "
             f"leave {', '.join(rated)} out of the scene"
         )
-    if model.iterated_forces and redundancy.rank.redundant:
-        from dap3d_core.simulation.redundancy.shared_reactions import refuse_shared, shared_laws
-
-        refuse_shared(shared_laws(compiled.checked, evaluator, u, redundancy, t), evaluator)
+    refuse_shared(shared_laws(compiled.checked, evaluator, u, redundancy, t), evaluator)
     if model.friction:
         notes.append(
             "joints with friction: linearised with the smooth law of friction at this state, "
             "which at rest is a strong damper and no stiction"
         )
-    return OperatingPoint(
-        compiled, t, u, evaluator.states, tangent, frames, redundancy, tuple(notes), rank
-    )
+    return OperatingPoint(compiled, t, u, evaluator.states, tangent, frames, tuple(notes), rank)
 
 
 def _refuse_unknown_modes(evaluator: Evaluator, t: float, u: Floats, states: Floats | None) -> None:

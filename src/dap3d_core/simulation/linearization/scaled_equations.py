@@ -121,7 +121,7 @@ def scaled_equations(
         acceleration_by_displacement=by_displacement,
         acceleration_by_velocity=by_velocity,
         gradient=gradient,
-        position_row=tangent.position_row,
+        position_row=model.position_row,
         states=_scaled_states(tangent, U, inverse),
     )
 

@@ -63,11 +63,7 @@ def steady_frames(
 ) -> SteadyFrames:
     """Angular velocities of the axes in which the motion from a state u (13 n,) is steady.
 
-    Args:
-        model: the model.
-        tangent: the equations of motion there.
-        u: the state.
-        dependencies: of redundant rows.
+    dependencies: of redundant rows.
     """
     n = model.body_count
     _, p, v, w = split(u)

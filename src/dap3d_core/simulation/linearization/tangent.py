@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.common.sparse_entries import SparseEntries, components
 from dap3d_core.formulations.evaluator import Evaluator
@@ -48,9 +47,7 @@ class TangentMatrices:
             friction of joints and forces on reactions.
         a: (6 n,) accelerations r_ddot, omega_dot at which R was differentiated.
         multipliers: (rows,) lambda at which R was differentiated.
-        C, nu, gamma: (rows,) of the constraint rows; C is zero where a row has no position level.
         D: (rows, 6 n) constraint Jacobian.
-        position_row: (rows,) bool, True where a row has a position level.
         stiffness: (6 n, 6 n) -dR/dx by displacements, reactions and inertia included.
         damping: (6 n, 6 n) -dR/dv by velocities, gyroscopic terms included.
         friction_by_multipliers: (6 n, rows) df/dlambda; without entries where no force depends on
@@ -65,11 +62,7 @@ class TangentMatrices:
     f: Floats
     a: Floats
     multipliers: Floats
-    C: Floats
-    nu: Floats
-    gamma: Floats
     D: Any
-    position_row: NDArray[np.bool_]
     stiffness: Any
     damping: Any
     friction_by_multipliers: Any
@@ -103,7 +96,7 @@ def tangent_matrices(
         layout = model.report_layout
         a = reported[layout["v_dot"]] if a is None else a
         multipliers = reported[layout["Lam"]] if multipliers is None else multipliers
-    rows = evaluator.rows(t, u)
+    D = evaluator.rows(t, u).sparse()
     evaluator.place(t, u)
     assembly = _Assembly(evaluator, t, np.asarray(multipliers, float), np.asarray(a, float), u)
     for loop, (kind, group) in enumerate(evaluator.loop_groups):
@@ -121,11 +114,7 @@ def tangent_matrices(
         f=assembly.f,
         a=assembly.a,
         multipliers=assembly.multipliers,
-        C=rows.C,
-        nu=rows.nu,
-        gamma=rows.gamma,
-        D=rows.sparse(),
-        position_row=model.position_row,
+        D=D,
         states=states,
         **assembly.matrices(),
     )

@@ -57,15 +57,17 @@ def instant_of(
     row = np.concatenate([[t], evaluator.body_state(y), reported])
     if complete is not None:
         complete(row)
-    record = RunMetadata(scene_text=scene_text)
-    rows = evaluator.with_inputs(row[None])
-    return Result.of_run(evaluator.model, rows, record, lambda: evaluator)
+    return _result_of(scene_text, evaluator, row)
 
 
 def probe_of(scene_text: str, evaluator: Evaluator, u: Floats | None = None) -> Result:
     """A result of one instant, without accelerations and multipliers: u (13 n,), or the start."""
     y = evaluator.integrated(evaluator.model.u0 if u is None else u)
     row = np.concatenate([[0.0], y, np.zeros(evaluator.report_size)])
+    return _result_of(scene_text, evaluator, row)
+
+
+def _result_of(scene_text: str, evaluator: Evaluator, row: Floats) -> Result:
     record = RunMetadata(scene_text=scene_text)
     rows = evaluator.with_inputs(row[None])
     return Result.of_run(evaluator.model, rows, record, lambda: evaluator)
@@ -74,8 +76,6 @@ def probe_of(scene_text: str, evaluator: Evaluator, u: Floats | None = None) -> 
 def inactive_joints(scene_text: str, evaluator: Evaluator, u: Floats) -> list[str]:
     """The joints that are not active at the start of a run, at a state u (13 n,)."""
     model = evaluator.model
-    if not model.active:
-        return []
     evaluator.set_inputs(model.input_values)  # a run before may have left others
     evaluator.states = model.initial_states
     probe = probe_of(scene_text, evaluator, u)

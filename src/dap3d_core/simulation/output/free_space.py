@@ -5,7 +5,6 @@ import shutil
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 from dap3d_core.result.file.atomic_write import file_size_limit
 from dap3d_core.scene import MISSING, Mistake, SceneError
@@ -114,8 +113,3 @@ def _size(byte_count: float) -> str:
     return (
         f"{byte_count / 2**30:,.3g} GiB" if byte_count >= 2**27 else f"{byte_count / 1e6:,.3g} MB"
     )
-
-
-def row_width(evaluator: Any) -> int:
-    """Numbers that a run stores for each instant: time, state, work, and further reports."""
-    return int(evaluator.model.row_layout.size)

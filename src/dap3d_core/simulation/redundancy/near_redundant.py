@@ -23,8 +23,8 @@ from dap3d_core.linear.rank import DENSE_ROWS
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import coordinates_of, velocities_of
 from dap3d_core.simulation.errors import AssemblyError
-from dap3d_core.simulation.initial.assemble import FIT, correct_positions, fit_of, max_speed
-from dap3d_core.simulation.initial.least_change import displaced, finite_rows
+from dap3d_core.simulation.initial.assemble import FIT, Assembly, fit_of, max_speed
+from dap3d_core.simulation.initial.least_change import displaced, finite_rows, largest_move
 
 #: From this part of the largest singular value on rows are held: the root of the regularisation of
 #: lsq, 1e-9 of a row's square.
@@ -45,7 +45,6 @@ NEARLY = 1e-2
 #: What is asked of a combination is nothing below this part of what is asked of its rows.
 NOTHING = 1e-6
 HALVINGS = 40
-NO_ROWS = np.zeros(0, dtype=np.int64)
 
 
 @attrs.frozen
@@ -94,13 +93,10 @@ def bindings(
 def _leads_away(evaluator: Evaluator, u: Floats, t: float, direction: Floats) -> bool:
     """True if the joints can be closed at another pose in this direction (6 n,)."""
     step = direction.reshape(-1, 6) * np.repeat([evaluator.model.length, 1.0], 3)
-    extent = max(
-        float(np.max(np.linalg.norm(step[:, :3], axis=1))) / (SHIFT * evaluator.model.size),
-        float(np.max(np.linalg.norm(step[:, 3:], axis=1))) / TURN,
-    )
-    moved = displaced(u, step / extent)
+    shift, turn = largest_move(step)
+    moved = displaced(u, step / max(shift / (SHIFT * evaluator.model.size), turn / TURN))
     try:
-        closed, _ = correct_positions(evaluator, moved, t, NO_ROWS)
+        closed, _ = Assembly(evaluator, t).close(moved)
     except AssemblyError:
         return False
     gone, asked = coordinates_of(closed - u), coordinates_of(moved - u)
@@ -111,7 +107,6 @@ def find_contradiction(evaluator: Evaluator, t: float, y: Floats, rank: int) -> 
     """Message on joints that contradict each other from about time t on; "" if none do.
 
     Args:
-        evaluator: the model.
         t, y: time and integrated state of the last step.
         rank: that of the constraints at the start.
     """
@@ -153,7 +148,7 @@ def _closed(evaluator: Evaluator, u: Floats, t: float, later: float) -> Floats |
     """The bodies at a later time, put together; None where they cannot be."""
     moved = displaced(u, (later - t) * velocities_of(u))
     try:
-        return correct_positions(evaluator, moved, later, NO_ROWS)[0]
+        return Assembly(evaluator, later).close(moved)[0]
     except AssemblyError:
         return None
 

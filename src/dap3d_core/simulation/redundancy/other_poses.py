@@ -13,8 +13,13 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import coordinates_of
 from dap3d_core.simulation.errors import AssemblyError
-from dap3d_core.simulation.initial.assemble import correct_positions
-from dap3d_core.simulation.initial.least_change import displaced, finite_rows, least_change
+from dap3d_core.simulation.initial.assemble import Assembly
+from dap3d_core.simulation.initial.least_change import (
+    displaced,
+    finite_rows,
+    largest_move,
+    least_change,
+)
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, rank_of
 
 #: Poses that are tried up to this many rows; beyond, the last number.
@@ -69,7 +74,6 @@ def redundancy_elsewhere(evaluator: Evaluator, u: Floats, redundancy: Redundancy
     """Take the rank at other poses that the joints allow at t = 0; the same ones each time.
 
     Args:
-        evaluator: the model.
         u: (13 n,) an assembled state.
         redundancy: that of u.
     """
@@ -97,21 +101,17 @@ def _other_pose(evaluator: Evaluator, u: Floats, rng: "np.random.Generator") -> 
     wish[:, :3] *= size
     wish = wish.ravel()
     free = wish - least_change(evaluator, rows, rows.product(wish), 0.0, NONE)
-    free = free.reshape(n, 6)
     if np.linalg.norm(free) <= FREE * np.linalg.norm(wish):
         return None
-    extent = max(_largest(free[:, :3]) / (SHIFT * size), _largest(free[:, 3:]) / TURN)
+    shift, turn = largest_move(free)
+    extent = max(shift / (SHIFT * size), turn / TURN)
     for halving in range(HALVINGS + 1):
         step = free / (extent * 2.0**halving)
         try:
-            other, _ = correct_positions(evaluator, displaced(u, step), 0.0, NONE)
+            other, _ = Assembly(evaluator).close(displaced(u, step))
         except AssemblyError:
             continue
         gone = np.linalg.norm(coordinates_of(other - u))
         if gone > ANOTHER * np.linalg.norm(coordinates_of(displaced(u, step) - u)):
             return other
     return None
-
-
-def _largest(vectors: Floats) -> float:
-    return float(np.max(np.linalg.norm(vectors, axis=1)))

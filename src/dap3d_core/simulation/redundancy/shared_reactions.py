@@ -62,7 +62,6 @@ def shared_laws(
     """Forces of a scene whose law depends on how redundant rows share their load.
 
     Args:
-        checked, evaluator: the scene and its model.
         u, t: (13 n,) an assembled state, and its time.
         redundancy: that of this state.
     """
@@ -113,10 +112,7 @@ def why_refused(laws: Sequence[SharedLaw]) -> str:
 def refuse_shared(laws: Sequence[SharedLaw], evaluator: Evaluator, implicit: str = "") -> None:
     """Refuse laws on reactions that are not unique, but where the least are wanted and found.
 
-    Args:
-        laws: of the scene.
-        evaluator: of its model.
-        implicit: name of the integrator, where it is an implicit one.
+    implicit: name of the integrator, where it is an implicit one.
 
     Raises:
         RedundantError: gives reason and remedy.
@@ -140,7 +136,6 @@ class ShareSpread:
     """Measures how much the work of laws depends on the share of what redundant rows carry."""
 
     def __init__(self, evaluator: Evaluator, laws: Sequence[SharedLaw]) -> None:
-        """Args: evaluator and laws of a run."""
         self._evaluator, self._laws = evaluator, laws
         self._kept: list[tuple[float, Floats, Floats, Floats]] = []
         self._stride, self._seen = 1, 0

@@ -246,14 +246,6 @@ class SteppedRun:
         raise SimulationError(self._failure, self.result())
 
 
-class OpenRun(Run):
-    """A run with no reports of its own, and mostly without an end."""
-
-    def function_notes(self) -> list[str]:
-        """None: how often states are looked at is not known."""
-        return []
-
-
 @checked
 def start(
     scene: Scene | str | os.PathLike[str] | CompiledModel,
@@ -287,7 +279,8 @@ def start(
     end = HORIZON if t_end is None else t_end
     simulation = settings_of(compiled, t_end=end, dt=end, **settings)
     with compiled.borrow_evaluator():
-        run = OpenRun(compiled, simulation, Callbacks(announce=announce))
+        run = Run(compiled, simulation, Callbacks())
+        run.reports = False  # how often states are looked at is not known
         run.notes += replaced_notes(compiled, simulation, settings)
         return SteppedRun(run, record=record)
 

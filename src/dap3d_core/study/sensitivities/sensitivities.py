@@ -243,7 +243,7 @@ def sensitivities(
         beside = [neighbours_of(compiled, parameter, given, base) for parameter in part]
         with compiled.borrow_evaluator():
             simulation = settings_of(compiled, method=method, **given)
-            run = DifferentiatedRun(compiled, simulation, Callbacks(announce=announce), start=state)
+            run = DifferentiatedRun(compiled, simulation, Callbacks(), start=state)
             results.append(run.carry(beside, base, lanes).execute())
         runs.append(run)
     for note in _notes(compiled, runs, results[0]):

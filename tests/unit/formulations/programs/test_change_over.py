@@ -199,7 +199,7 @@ def test_numbers_that_change_in_a_run_stop_the_program(at_once):
     integration = EXPLICIT.make(
         evaluator, y0, np.array([0.0, 1.0]), report_size=evaluator.report_size
     )
-    addresses = integration.functions.addresses
+    addresses = evaluator.functions.addresses
     before, advance = addresses.copy(), integration.advance
 
     def advanced(budget):
