@@ -23,12 +23,6 @@ def bound_to_joints(
 ) -> tuple[Group, ...]:
     """Groups of forces; those whose types read reactions with the numbers of the joints behind.
 
-    Args:
-        groups: of forces.
-        forces: all forces of the scene.
-        joint_groups: the groups of its joints.
-        joints: all joints of the scene.
-
     Raises:
         PrepareError: a joint has not the rows that a type reads: all such forces.
         PluginError: a type cannot read the reaction of a joint.

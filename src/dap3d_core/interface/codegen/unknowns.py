@@ -31,11 +31,7 @@ def write_with_unknowns(
 ) -> Loop | None:
     """As ``loop_source.write``, of a joint with unknowns.
 
-    Args:
-        type_info: the type.
-        what: the kind of the loop.
-        kernels: those that it calls.
-        wanted: the names that they need.
+    wanted: the names that the kernels need.
     """
     layout, unknowns = type_info.layout, type_info.layout.unknowns
     bounds = bound_values(type_info) if what == "bound" else []

@@ -53,9 +53,7 @@ def _plain(value: Any) -> Any:
 def _drawn(kind: str, own: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     """Types of shapes and their fields that draw a surface.
 
-    Args:
-        kind: one of ``interface.contacts.contact.SURFACES``.
-        own: its fields.
+    kind: one of ``interface.contacts.contact.SURFACES``.
     """
     at, axis, radius = own["P"], own["a"], own["radius"]
     match kind:
