@@ -162,13 +162,11 @@ def kept_value(type_info: TypeInfo, name: str) -> str:
 
 def bound_values(type_info: TypeInfo) -> list[str]:
     """Distances of the unknowns from their bounds, but for those that are periodic."""
-    values = []
-    for name in type_info.layout.unknowns:
-        if name not in _joint(type_info).periodic:
-            for suffix, sign in ((LEAST, ""), (GREATEST, "-")):
-                at = type_info.layout.numbers[f"{name}{suffix}"][0]
-                values.append(f"{sign}(x_{name} - par[p1 + {at}])")
-    return values
+    signs, numbers = {"least": "", "greatest": "-"}, type_info.layout.numbers
+    return [
+        f"{signs[words]}(x_{name} - par[p1 + {numbers[field][0]}])"
+        for name, words, field in bound_words(type_info)
+    ]
 
 
 def bound_words(type_info: TypeInfo) -> list[tuple[str, str, str]]:
