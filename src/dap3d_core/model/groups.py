@@ -76,6 +76,11 @@ class Group:
         place = self.type_info.layout.numbers.get(name)
         return np.zeros(len(self.members)) if place is None else self.numbers[:, place[0]]
 
+    def of_instance(self, k: int) -> dict[str, Floats]:
+        """The numbers of an instance, by the names of their fields and in their shapes."""
+        row, places = self.numbers[k], self.type_info.layout.numbers.items()
+        return {n: row[at : at + size(shape)].reshape(shape) for n, (at, shape) in places}
+
     @property
     def keyword(self) -> str:
         """The type's word in a scene."""
