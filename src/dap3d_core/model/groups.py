@@ -151,7 +151,7 @@ class Grouping:
             given = tuple((n, f.structure) for n, f in self._given(instance).items())
             alone = None if instance.breaks_at is None else instance.name  # its loop may end
             by_type.setdefault((instance.structure, given, alone), []).append(place)
-        return _each(
+        return each(
             lambda places: self._group(
                 [instances[k] for k in places], [members[k] for k in places]
             ),
@@ -186,7 +186,7 @@ class Grouping:
         for place, force in forces:
             row, joint = joints[force.values[force.type_info.friction_joint]]
             by_type.setdefault(joint.type_info.type, []).append((place, force, row, joint))
-        return _each(self._friction, by_type.values())
+        return each(self._friction, by_type.values())
 
     def _friction(self, pairs: list[tuple[int, Instance, int, Instance]]) -> Group:
         type_info = pairs[0][3].type_info
@@ -299,7 +299,7 @@ class Grouping:
                 offset, shape = instance.type_info.layout.numbers[name]
                 row[offset : offset + size(shape)] = np.reshape(value, -1)
 
-        _each(put, range(len(instances)))
+        each(put, range(len(instances)))
 
     def callable_of(self, function: Instance) -> Callable[[float], Any]:
         """A function of one argument in Python."""
@@ -344,7 +344,7 @@ class Grouping:
                     finally:
                         self._note(record, instances[place])
 
-            found = _each(constants_of, range(len(instances)))
+            found = each(constants_of, range(len(instances)))
             given = [values | constants for values, constants in zip(given, found, strict=True)]
         numbers = np.zeros((len(instances), type_info.layout.par_width))
         for name, (offset, shape) in type_info.layout.numbers.items():
@@ -373,7 +373,7 @@ class Grouping:
                 self.notes.append(note)
 
 
-def _each(make: Callable[[Any], Made], parts: Iterable[Any]) -> tuple[Made, ...]:
+def each(make: Callable[[Any], Made], parts: Iterable[Any]) -> tuple[Made, ...]:
     """What is made of each part; a PrepareError has the faults of all."""
     made: list[Made] = []
     faults: list[tuple[int, str]] = []
