@@ -240,12 +240,7 @@ class ParameterMap:
         path, index = parameter.path, parameter.index
         _, name, field = path
         body = self._checked.body_index[name]
-        read = {
-            part
-            for instance in self._elements
-            for b, part in self._reads(instance).poses
-            if b == body
-        }
+        read = {part for one in self._elements for b, part in self._reads(one).poses if b == body}
         by_mass = str(self._checked.scene.simulation.correct_metric) == "mass"
         if field == "mass":
             limits = FieldSpec("number", 1.0, positive=True)
@@ -269,8 +264,7 @@ class ParameterMap:
 
     def _of_element(self, parameter: SceneParameter) -> MappedParameter:
         table, name, field = parameter.path
-        named = (i for i in getattr(self._checked, table) if i.name == name)
-        instance = next(named, None)
+        instance = next((i for i in getattr(self._checked, table) if i.name == name), None)
         if instance is None:  # a rigid stop, which is a contact
             raise NotCopiedError
         type_: Any = instance.type_info.type
@@ -474,9 +468,7 @@ def dependence_of(
 def _recorded(instance: Instance, read: set[str]) -> Any:
     """The element as ``prepare`` gets it, of a class that records reads of its fields."""
     type_: Any = instance.type_info.type
-    specs = specs_of(type_)
-    ends = ("P_i", "P_j") if any(s.kind == "vector2" for s in specs.values()) else ()
-    names = frozenset((*specs, *ends))
+    names = {*specs_of(type_), "P_i", "P_j"}
     initial = set(read)
 
     class Recorded(type_):  # type: ignore[misc]
