@@ -296,6 +296,11 @@ def acts_on_all(type_: type[TypeBase]) -> int:
     return 2 if getattr(type_, "each_pair", False) else int(getattr(type_, "each_body", False))
 
 
+def has_prepare(type_: Any) -> bool:
+    """True if a type defines ``prepare``."""
+    return type_.prepare not in (base.__dict__.get("prepare") for base in TypeBase.__subclasses__())
+
+
 def turns_of(type_: type[TypeBase], body_count: int) -> list[tuple[int, ...]]:
     """The bodies, or pairs of bodies, that such a type acts on in turn, by their indices."""
     return list(combinations(range(1, body_count + 1), acts_on_all(type_)))

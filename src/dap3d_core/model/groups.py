@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import attrs
 import numpy as np
@@ -17,12 +17,20 @@ from dap3d_core.interface.codegen.specialise import (
 )
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.examine.constants import prepared
-from dap3d_core.interface.fields import FieldSpec, specs_of
-from dap3d_core.interface.types import BodyPose, TypeBase, acts_on_all, turns_of
+from dap3d_core.interface.fields import specs_of
+from dap3d_core.interface.types import (
+    BodyPose,
+    TypeBase,
+    acts_on_all,
+    has_prepare,
+    turns_of,
+)
 from dap3d_core.kernels.array_types import Floats as Floats
 from dap3d_core.kernels.array_types import Integers as Integers
 from dap3d_core.model.knots import knots_of
 from dap3d_core.scene import Instance
+
+Made = TypeVar("Made")
 
 
 class PrepareError(ValueError):
@@ -67,6 +75,11 @@ class Group:
         """(m,) a number of each, by the name of its field; zeros where the type has none."""
         place = self.type_info.layout.numbers.get(name)
         return np.zeros(len(self.members)) if place is None else self.numbers[:, place[0]]
+
+    def of_instance(self, k: int) -> dict[str, Floats]:
+        """The numbers of an instance, by the names of their fields and in their shapes."""
+        row, places = self.numbers[k], self.type_info.layout.numbers.items()
+        return {n: row[at : at + size(shape)].reshape(shape) for n, (at, shape) in places}
 
     @property
     def keyword(self) -> str:
@@ -128,9 +141,7 @@ class Grouping:
 
         Each joint that may be released is in a group of its own.
 
-        Args:
-            instances: checked elements, in file order.
-            members: their places among all elements of the kind.
+        members: places of the instances among all elements of the kind.
 
         Raises:
             PrepareError: types refuse the values of instances: all of them.
@@ -140,7 +151,7 @@ class Grouping:
             given = tuple((n, f.structure) for n, f in self._given(instance).items())
             alone = None if instance.breaks_at is None else instance.name  # its loop may end
             by_type.setdefault((instance.structure, given, alone), []).append(place)
-        return _each(
+        return each(
             lambda places: self._group(
                 [instances[k] for k in places], [members[k] for k in places]
             ),
@@ -175,7 +186,7 @@ class Grouping:
         for place, force in forces:
             row, joint = joints[force.values[force.type_info.friction_joint]]
             by_type.setdefault(joint.type_info.type, []).append((place, force, row, joint))
-        return _each(self._friction, by_type.values())
+        return each(self._friction, by_type.values())
 
     def _friction(self, pairs: list[tuple[int, Instance, int, Instance]]) -> Group:
         type_info = pairs[0][3].type_info
@@ -211,7 +222,7 @@ class Grouping:
         on_each = bool(acts_on_all(type_info.type))
         turns = turns_of(type_info.type, self.body_count) if on_each else []
         n = len(turns)
-        if on_each and _prepares(type_info.type):  # its constants may differ from body to body
+        if on_each and has_prepare(type_info.type):  # its constants may differ from body to body
             on_each = False
             members = [m for m in members for _ in range(n)]
             instances = [attrs.evolve(i, bodies=turn) for i in instances for turn in turns]
@@ -253,36 +264,42 @@ class Grouping:
         counts: dict[str, int] = {}
         for field in functions[0]:
             column = [of_instance[field] for of_instance in functions]
-            try:
-                types[field], more, found = self._combined(column, range(len(column)))
-            except PrepareError as error:
-                raise PrepareError(
-                    *[(members[k], f"function {column[k].name}: {w}") for k, w in error.faults]
-                ) from error
-            tables += [(k, numbers.shape[1] + offset, rows) for k, offset, rows in found]
+            types[field], more, found = self._behind(numbers, column, members)
+            tables += found
             knots = knots_of(column)
             counts[field] = knots.shape[1]
             numbers = np.hstack([numbers, more, knots])
         return bind_functions(type_info, types, counts), numbers, tables
 
+    def _behind(
+        self, numbers: Floats, functions: Sequence[Instance], members: Sequence[int]
+    ) -> tuple[TypeInfo, Floats, list[tuple[int, int, Floats]]]:
+        """``_combined`` of functions of elements, with tables behind the numbers of these."""
+        try:
+            type_info, more, tables = self._combined(functions, range(len(functions)))
+        except PrepareError as error:
+            raise PrepareError(
+                *[(members[k], f"function {functions[k].name}: {w}") for k, w in error.faults]
+            ) from error
+        return type_info, more, [(k, numbers.shape[1] + at, rows) for k, at, rows in tables]
+
     def _prepare_functions(
         self, instances: list[Instance], members: Sequence[int], numbers: Floats
     ) -> None:
         """Put in place the numbers that types find from functions of an argument."""
-        faults = []
-        for row, instance, member in zip(numbers, instances, members, strict=True):
-            layout = instance.type_info.layout
+
+        def put(place: int) -> None:
+            instance, row = instances[place], numbers[place]
             try:
                 given = {n: self.callable_of(f) for n, f in self._given(instance).items()}
-                constants = _thing(instance).prepare_functions(given)
+                constants = as_object(instance).prepare_functions(given)
             except ValueError as error:
-                faults.append((member, str(error)))
-                continue
+                raise PrepareError((members[place], str(error))) from error
             for name, value in constants.items():
-                offset, shape = layout.numbers[name]
+                offset, shape = instance.type_info.layout.numbers[name]
                 row[offset : offset + size(shape)] = np.reshape(value, -1)
-        if faults:
-            raise PrepareError(*faults)
+
+        each(put, range(len(instances)))
 
     def callable_of(self, function: Instance) -> Callable[[float], Any]:
         """A function of one argument in Python."""
@@ -295,7 +312,7 @@ class Grouping:
         return lambda x: kernel(**given, x=x)
 
     def _combined(
-        self, functions: list[Instance], members: Sequence[int]
+        self, functions: Sequence[Instance], members: Sequence[int]
     ) -> tuple[TypeInfo, Floats, list[tuple[int, int, Floats]]]:
         """The type of functions of one structure with their terms known, numbers and tables."""
         type_info = functions[0].type_info
@@ -306,35 +323,28 @@ class Grouping:
 
         terms = []
         for column in zip(*(function.terms for function in functions), strict=True):
-            try:
-                term, more, found = self._combined(list(column), range(len(column)))
-            except PrepareError as error:
-                raise PrepareError(
-                    *[(members[k], f"function {column[k].name}: {w}") for k, w in error.faults]
-                ) from error
+            term, more, found = self._behind(numbers, column, members)
             terms.append(term)
-            tables += [(k, numbers.shape[1] + offset, rows) for k, offset, rows in found]
+            tables += found
             numbers = np.hstack([numbers, more])
         return bind_terms(type_info, terms), numbers, tables
 
     def _numbers(
-        self, type_info: TypeInfo, instances: list[Instance], members: Sequence[int]
+        self, type_info: TypeInfo, instances: Sequence[Instance], members: Sequence[int]
     ) -> tuple[Floats, list[tuple[int, int, Floats]]]:
         """(m, par_width) numbers of all instances, from their fields and ``prepare``; tables."""
         given, fields = [i.values for i in instances], specs_of(type_info.type)
-        if _prepares(type_info.type):
-            with warnings.catch_warnings(record=True) as record:
-                warnings.simplefilter("always")
-                found: list[dict[str, Any]] = []
-                faults: list[tuple[int, str]] = []
-                for instance, member in zip(instances, members, strict=True):
+        if has_prepare(type_info.type):
+
+            def constants_of(place: int) -> dict[str, Any]:
+                with warnings.catch_warnings(record=True) as record:
+                    warnings.simplefilter("always")
                     try:
-                        found.append(_prepared(type_info, fields, instance, member, self.poses))
-                    except PrepareError as error:
-                        faults += error.faults
-                    self._note(record, instance)
-            if faults:
-                raise PrepareError(*faults)
+                        return _prepared(instances[place], members[place], self.poses)
+                    finally:
+                        self._note(record, instances[place])
+
+            found = each(constants_of, range(len(instances)))
             given = [values | constants for values, constants in zip(given, found, strict=True)]
         numbers = np.zeros((len(instances), type_info.layout.par_width))
         for name, (offset, shape) in type_info.layout.numbers.items():
@@ -361,12 +371,11 @@ class Grouping:
             note = f"{self.kind} {instance.name} ({keyword}): {warning.message}"
             if note not in self.notes:
                 self.notes.append(note)
-        record.clear()
 
 
-def _each(make: Callable[[Any], Group], parts: Iterable[Any]) -> tuple[Group, ...]:
-    """A group of each part."""
-    made: list[Group] = []
+def each(make: Callable[[Any], Made], parts: Iterable[Any]) -> tuple[Made, ...]:
+    """What is made of each part; a PrepareError has the faults of all."""
+    made: list[Made] = []
     faults: list[tuple[int, str]] = []
     for part in parts:
         try:
@@ -376,11 +385,6 @@ def _each(make: Callable[[Any], Group], parts: Iterable[Any]) -> tuple[Group, ..
     if faults:
         raise PrepareError(*faults)
     return tuple(made)
-
-
-def _prepares(type_: Any) -> bool:
-    """True if a type defines ``prepare``."""
-    return type_.prepare not in (base.__dict__.get("prepare") for base in TypeBase.__subclasses__())
 
 
 def _packed(numbers: Floats, tables: Iterable[tuple[int, int, Floats]], p0: int) -> Floats:
@@ -393,28 +397,22 @@ def _packed(numbers: Floats, tables: Iterable[tuple[int, int, Floats]], p0: int)
     return np.concatenate([numbers.ravel(), *(rows.ravel() for _, _, rows in tables)])
 
 
-def _thing(instance: Instance) -> Any:
-    """An instance as an object of its class, which ``prepare`` reads."""
+def as_object(instance: Instance, class_: Any = None) -> Any:
+    """An instance as an object of its type, or of a class in its place: what ``prepare`` reads."""
     type_: Any = instance.type_info.type
     fields, values = specs_of(type_), instance.values
-    thing = type_(**{n: values[n] for n in fields if n in values})
+    found = (class_ or type_)(**{n: values[n] for n in fields if n in values})
     if any(spec.kind == "vector2" for spec in fields.values()):
-        thing.P_i, thing.P_j = values["P_i"], values["P_j"]
-    return thing
+        found.P_i, found.P_j = values["P_i"], values["P_j"]
+    return found
 
 
-def _prepared(
-    type_info: TypeInfo,
-    fields: Mapping[str, FieldSpec],
-    instance: Instance,
-    member: int,
-    poses: Mapping[int, BodyPose],
-) -> dict[str, Any]:
+def _prepared(instance: Instance, member: int, poses: Mapping[int, BodyPose]) -> dict[str, Any]:
     """Values that ``prepare`` returns for an instance, with the names and shapes examined."""
-    thing = _thing(instance)
+    type_info = instance.type_info
     bodies = {s: poses[b] for s, b in zip(type_info.layout.slots, instance.bodies, strict=True)}
     try:
-        constants = prepared(thing, bodies)
+        constants = prepared(as_object(instance), bodies)
     except ValueError as error:
         raise PrepareError((member, str(error))) from error
     for name, value in constants.items():

@@ -35,7 +35,7 @@ from dap3d_core.model.state_layout import (
     split,
     state_layout,
 )
-from dap3d_core.scene import Instance, ValidatedScene
+from dap3d_core.scene import ValidatedScene
 from dap3d_core.scene.contacts.collision_shapes import CollisionShapes
 from dap3d_core.scene.validate.validated_scene import Bodies
 
@@ -404,59 +404,42 @@ class _Groups:
         n = len(checked.body_names)
         kinds = ("joint", "force", "function")
         by_kind = {k: Grouping(k, poses, n, checked.functions) for k in kinds}
-        every = (*checked.holding, *checked.forces)
-        used = {place - 1 for instance in every for place in instance.functions}
-        functions = [(k, f) for k, f in enumerate(checked.functions) if k in used]
-        through = [(k, f) for k, f in enumerate(checked.forces) if f.type_info.friction_joint]
-        direct = [(k, f) for k, f in enumerate(checked.forces) if not f.type_info.friction_joint]
-        joints = {j.name: (k, j) for k, j in enumerate(checked.holding)}
         names = {"joint": checked.holding, "force": checked.forces, "function": checked.functions}
-
+        every = (*checked.holding, *checked.forces)
+        used = {place for instance in every for place in instance.functions}
+        functions = [k for k in range(len(checked.functions)) if k + 1 in used]
+        through = [(k, f) for k, f in enumerate(checked.forces) if f.type_info.friction_joint]
+        direct = [k for k, f in enumerate(checked.forces) if not f.type_info.friction_joint]
+        joints = {j.name: (k, j) for k, j in enumerate(checked.holding)}
+        index = {name: k for name, (k, _) in joints.items()}
         faults: list[tuple[str, str, str]] = []
 
-        def made(kind: str, elements: Sequence[tuple[int, Instance]]) -> tuple[Group, ...]:
-            places, instances = [k for k, _ in elements], [i for _, i in elements]
+        def made(kind: str, make: Callable[[], tuple[Group, ...]]) -> tuple[Group, ...]:
+            """Groups; none, and faults with the names of elements of a kind, if types refuse."""
             try:
-                if kind == "joint":
-                    index = {name: k for name, (k, _) in joints.items()}
-                    return by_kind[kind].loaded_groups(instances, index)
-                return by_kind[kind].groups(instances, places)
+                return make()
             except PrepareError as error:
-                faults.extend(_faults(kind, names[kind], error))
+                known = names[kind]
+                faults.extend((kind, known[member].name, words) for member, words in error.faults)
                 return ()
 
-        self.joints = made("joint", list(joints.values()))
+        def groups(kind: str, places: Sequence[int]) -> tuple[Group, ...]:
+            return by_kind[kind].groups([names[kind][k] for k in places], places)
+
+        self.joints = made("joint", lambda: by_kind["joint"].loaded_groups(checked.holding, index))
         are_good = not faults
-        self.forces = made("force", direct)
-        self.functions = made("function", functions)
-        self._read_reactions(checked, faults)
-        self.friction: tuple[Group, ...] = ()
-        try:
-            if are_good:
-                self.friction = by_kind["joint"].friction(through, joints)
-        except PrepareError as error:
-            faults.extend(_faults("force", checked.forces, error))
+        self.forces = made("force", lambda: groups("force", direct))
+        self.functions = made("function", lambda: groups("function", functions))
+        if not faults and any(joint_fields(group.type_info.type) for group in self.forces):
+            from dap3d_core.model.reaction_groups import bound_to_joints
+
+            of = self.forces, checked.forces, self.joints, checked.joints
+            self.forces = made("force", lambda: bound_to_joints(*of))
+        friction = by_kind["joint"].friction
+        self.friction = made("force", lambda: friction(through, joints)) if are_good else ()
         if faults:
             raise ModelError(*faults)
         self.notes = [note for grouping in by_kind.values() for note in grouping.notes]
-
-    def _read_reactions(self, checked: ValidatedScene, faults: list[tuple[str, str, str]]) -> None:
-        """Bind forces to the joints whose reactions they read."""
-        if faults or not any(joint_fields(group.type_info.type) for group in self.forces):
-            return
-        from dap3d_core.model.reaction_groups import bound_to_joints
-
-        try:
-            self.forces = bound_to_joints(self.forces, checked.forces, self.joints, checked.joints)
-        except PrepareError as error:
-            faults.extend(_faults("force", checked.forces, error))
-
-
-def _faults(
-    kind: str, instances: Sequence[Instance], error: PrepareError
-) -> list[tuple[str, str, str]]:
-    """Mistakes in instances, with their names."""
-    return [(kind, instances[member].name, words) for member, words in error.faults]
 
 
 class ReferencePoses(dict[int, BodyPose]):

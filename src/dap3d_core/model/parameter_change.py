@@ -26,11 +26,7 @@ class Change(NamedTuple):
 def changed(checked: ValidatedScene, model: Model, place: int, fields: Mapping[str, Any]) -> Change:
     """Parameters of a force for changed fields.
 
-    Args:
-        checked: the scene.
-        model: made from it.
-        place: of the force among the forces of the scene.
-        fields: field -> number, three numbers or a matrix.
+    place: of the force among those of the scene; fields: field -> number, three numbers, matrix.
 
     Raises:
         ValueError: the force has no such field, or it cannot be changed, or not to this value.

@@ -2,6 +2,7 @@
 
 import random
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 
 import attrs
 import numpy as np
@@ -11,7 +12,7 @@ from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import line_of
 from dap3d_core.interface.examine.random_values import random_quantity
-from dap3d_core.model.groups import Group, PrepareError
+from dap3d_core.model.groups import Group, PrepareError, each
 from dap3d_core.scene import Instance
 
 
@@ -23,12 +24,6 @@ def bound_to_joints(
 ) -> tuple[Group, ...]:
     """Groups of forces; those whose types read reactions with the numbers of the joints behind.
 
-    Args:
-        groups: of forces.
-        forces: all forces of the scene.
-        joint_groups: the groups of its joints.
-        joints: all joints of the scene.
-
     Raises:
         PrepareError: a joint has not the rows that a type reads: all such forces.
         PluginError: a type cannot read the reaction of a joint.
@@ -38,22 +33,18 @@ def bound_to_joints(
         for n, group in enumerate(joint_groups)
         for k, member in enumerate(group.members.tolist())
     }
-    found: list[Group] = []
-    faults: list[tuple[int, str]] = []
-    for group in groups:
+
+    def bound(group: Group) -> list[Group]:
         fields = reactions.joints_read(group.type_info)
         if not fields:
-            found.append(group)
-            continue
+            return [group]
         named = [[forces[member].values[f] for f in fields] for member in group.members.tolist()]
-        wrong = list(_wrong_rows(group, fields, named, places, joint_groups))
-        faults += wrong
-        if not wrong:
-            at = [[places[name] for name in names] for names in named]
-            found += _by_joints(group, fields, at, joint_groups)
-    if faults:
-        raise PrepareError(*faults)
-    return tuple(found)
+        if wrong := list(_wrong_rows(group, fields, named, places, joint_groups)):
+            raise PrepareError(*wrong)
+        at = [[places[name] for name in names] for names in named]
+        return list(_by_joints(group, fields, at, joint_groups))
+
+    return tuple(chain.from_iterable(each(bound, groups)))
 
 
 def _by_joints(

@@ -98,7 +98,7 @@ class Curve(NamedTuple):
 
 
 @attrs.frozen(eq=False)
-class CurvePicture(style.Picture):
+class CurvePicture(style.StackedPanels):
     """Panels of curves over one quantity: unit -> curves; a title above them.
 
     bands: unit -> modes of the contact of its curves over time.
@@ -109,15 +109,9 @@ class CurvePicture(style.Picture):
     title: str
     bands: "Mapping[str, Sequence[Band]]" = attrs.field(factory=dict)
 
-    @property
-    def height(self) -> float:
-        """A suitable height of the figure, inches."""
-        return style.HEIGHT if len(self.panels) == 1 else style.PANEL_HEIGHT * len(self.panels)
-
     def draw(self, figure: Figure) -> list[Axes]:
         """Draw all panels on an empty figure; returns their axes."""
-        axes = figure.subplots(len(self.panels), 1, sharex=True, squeeze=False)[:, 0]
-        width, height = figure.get_figwidth(), figure.get_figheight() / len(axes)
+        axes, width, height = self.axes_on(figure)
         for ax, (unit, curves) in zip(axes, self.panels.items(), strict=True):
             self._draw_panel(ax, unit, curves, height)
             if len(curves) > 1:
@@ -129,7 +123,7 @@ class CurvePicture(style.Picture):
             axes[0].set_aspect("equal", adjustable="datalim")
         if self.title:
             figure.suptitle(style.shown_text(self.title), fontsize=style.LETTERS + 1)
-        return list(axes)
+        return axes
 
     def draw_on(self, ax: Axes) -> Axes:
         """Draw on axes of the user; a ValueError where the curves have several units."""

@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import attrs
 import matplotlib
@@ -17,7 +17,7 @@ from dap3d_core.plot import style
 from dap3d_core.plot.curves import curve_picture, rate_of, smooth
 from dap3d_core.plot.figure_file import check_suffix, save_figure
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result import Result, ResultError, find
+from dap3d_core.result import Quantity, Result, ResultError, find
 from dap3d_core.result.errors import unknown
 from dap3d_core.study.fit.fit_result import Fit
 
@@ -252,31 +252,16 @@ def _labels_of(values: Sequence[complex], width: float, height: float) -> list[t
     return [(first, ", ".join(map(str, numbers))) for first, numbers in groups]
 
 
-class Panel(NamedTuple):
-    """A quantity of a path: its values (k, components), names of the components, label, unit."""
-
-    values: Floats
-    names: tuple[str, ...]
-    label: str
-    unit: str
-
-
-class EquilibriumPathPicture(style.Picture):
+class EquilibriumPathPicture(style.StackedPanels):
     """A panel for each quantity, over the parameter."""
 
     def __init__(self, path: "EquilibriumPath", quantities: Sequence[str]) -> None:
         self.path = path
-        self.panels = [_panel(path, name) for name in quantities or [path.largest_motion()]]
-
-    @property
-    def height(self) -> float:
-        """A suitable height of the figure, inches."""
-        return style.HEIGHT if len(self.panels) == 1 else style.PANEL_HEIGHT * len(self.panels)
+        self.panels = [path.quantity(name) for name in quantities or [path.largest_motion()]]
 
     def draw(self, figure: Figure) -> list[Axes]:
         """Draw all panels on an empty figure; returns their axes."""
-        axes = figure.subplots(len(self.panels), 1, sharex=True, squeeze=False)[:, 0]
-        width, height = figure.get_figwidth(), figure.get_figheight() / len(axes)
+        axes, width, height = self.axes_on(figure)
         for ax, panel in zip(axes, self.panels, strict=True):
             self._draw_panel(ax, panel, height)
         _, labels = axes[0].get_legend_handles_labels()
@@ -284,7 +269,7 @@ class EquilibriumPathPicture(style.Picture):
             style.legend_above(axes[0], labels, width)
         for ax in axes[:-1]:
             ax.set_xlabel("")
-        return list(axes)
+        return axes
 
     def draw_on(self, ax: Axes) -> Axes:
         """Draw on axes of the user; a ValueError where there are several quantities."""
@@ -295,9 +280,9 @@ class EquilibriumPathPicture(style.Picture):
             ax.legend(fontsize=style.LETTERS, frameon=False)
         return ax
 
-    def _draw_panel(self, ax: Axes, panel: Panel, height: float) -> None:
-        path = self.path
-        for k, (name, values) in enumerate(zip(panel.names, panel.values.T, strict=True)):
+    def _draw_panel(self, ax: Axes, panel: Quantity, height: float) -> None:
+        path, columns = self.path, panel.values.reshape(len(self.path.values), -1)
+        for k, values in enumerate(columns.T):
             colour = style.PALETTE[k % len(style.PALETTE)]
             fine, x, y = _smooth(path.length, path.values, values)
             for stable, rows in _runs(path):
@@ -305,29 +290,23 @@ class EquilibriumPathPicture(style.Picture):
                 ends = path.length[rows][[0, -1]]
                 part = (fine >= ends[0]) & (fine <= ends[1])
                 ax.plot(x[part], y[part], dash, color=colour, linewidth=1.4)
-            if name:
-                ax.plot([], [], color=colour, linewidth=1.4, label=style.shown_text(name))
+            if panel.components:
+                name = style.shown_text(panel.columns[k])
+                ax.plot([], [], color=colour, linewidth=1.4, label=name)
         if not (path.stable.all() or not path.stable.any()):
             for _, label, dash in STABILITY:
                 ax.plot([], [], dash, color="0.3", linewidth=1.4, label=label)
         for mark, (label, marker, colour) in SPECIAL.items():
             where = getattr(path, mark)
             if where.any():
-                x = np.repeat(path.values[where], panel.values.shape[1])
-                ax.plot(x, panel.values[where].ravel(), marker, color=colour, linestyle="",
+                x = np.repeat(path.values[where], columns.shape[1])
+                ax.plot(x, columns[where].ravel(), marker, color=colour, linestyle="",
                         markersize=5.0, label=label, zorder=3)  # fmt: skip
         for axis in (ax.xaxis, ax.yaxis):
             axis.set_major_formatter(style.PlainOffset())
         style.show_rounding_flat(ax)
         label = style.folded(style.with_unit(panel.label, panel.unit), 15 * height)
         style.style_axes(ax, style.with_unit(path.parameter, path.unit), label)
-
-
-def _panel(path: "EquilibriumPath", name: str) -> Panel:
-    quantity = path.quantity(name)
-    names = quantity.columns if quantity.components else ("",)
-    values = quantity.values.reshape(len(path.values), -1)
-    return Panel(values, names, quantity.label, quantity.unit)
 
 
 def _smooth(length: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:

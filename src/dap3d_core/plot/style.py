@@ -48,6 +48,22 @@ class Picture(ABC):
         raise ValueError(self.refusal)
 
 
+class StackedPanels(Picture):
+    """A picture of panels below one another over one x axis."""
+
+    panels: Any
+
+    @property
+    def height(self) -> float:
+        """A suitable height of the figure, inches."""
+        return HEIGHT if len(self.panels) == 1 else PANEL_HEIGHT * len(self.panels)
+
+    def axes_on(self, figure: Figure) -> tuple[list[Axes], float, float]:
+        """Axes of the panels on an empty figure; width and height of each, inches."""
+        axes = figure.subplots(len(self.panels), 1, sharex=True, squeeze=False)[:, 0]
+        return list(axes), figure.get_figwidth(), figure.get_figheight() / len(axes)
+
+
 class OnePanel(Picture):
     """A picture of one panel, which is drawn on axes."""
 

@@ -89,6 +89,11 @@ def _stored(array: str) -> Any:
     return property(values, doc=f"{SHAPES[column.dimension]} {column.meaning}{unit}.")
 
 
+def _recorded(name: str, meaning: str) -> Any:
+    """The attribute for a part of the record."""
+    return property(lambda result: getattr(result.record, name), doc=meaning)
+
+
 class Result(ResultDisplay, ResultContacts):
     """Result of a run: n bodies, m constraint rows, nP points at nt instants.
 
@@ -113,6 +118,17 @@ class Result(ResultDisplay, ResultContacts):
     Lam: Floats = _stored("Lam")
     work: Floats = _stored("work")
     inputs: Floats = _stored("inputs")
+
+    status: str = _recorded(
+        "status", "done; interrupted by the user; stopped early by an event or a failure."
+    )
+    method: str = _recorded("method", "The formulation that was used.")
+    integrator: str = _recorded("integrator", "The method of integration that was used.")
+    events: tuple[EventRecord, ...] = _recorded("events", "Located switches and events, in order.")
+    stats: RunStatistics = _recorded(
+        "stats", "Cost: steps, rejected, rhs, projections, wall_time_s, compile_time_s."
+    )
+    scene_text: str = _recorded("scene_text", "The scene that was run, as text of a scene file.")
 
     r = _motion("r")
     p = _motion("p")
@@ -197,21 +213,6 @@ class Result(ResultDisplay, ResultContacts):
         return ErrorEstimate(self.t, error, sizes_of(self.u), self.record.length)
 
     @property
-    def status(self) -> str:
-        """done; interrupted by the user; stopped early by an event or a failure."""
-        return self.record.status
-
-    @property
-    def method(self) -> str:
-        """The formulation that was used."""
-        return self.record.method
-
-    @property
-    def integrator(self) -> str:
-        """The method of integration that was used."""
-        return self.record.integrator
-
-    @property
     def notes(self) -> list[Note]:
         """Choices, changes and warnings of the run, in order."""
         return list(self.record.notes)
@@ -222,16 +223,6 @@ class Result(ResultDisplay, ResultContacts):
             self.record = attrs.evolve(self.record, notes=(*self.record.notes, text))
 
     @property
-    def events(self) -> tuple[EventRecord, ...]:
-        """Located switches and events, in order."""
-        return self.record.events
-
-    @property
-    def stats(self) -> RunStatistics:
-        """Cost of the run: steps, rejected, rhs, projections, wall_time_s, compile_time_s."""
-        return self.record.stats
-
-    @property
     def settings(self) -> dict[str, Any]:
         """The settings of the run."""
         return dict(self.record.settings)
@@ -240,11 +231,6 @@ class Result(ResultDisplay, ResultContacts):
     def versions(self) -> dict[str, str]:
         """Versions of dap3d, numpy, llvmlite and python in the run."""
         return dict(self.record.versions)
-
-    @property
-    def scene_text(self) -> str:
-        """The scene that was run, as the text of a scene file."""
-        return self.record.scene_text
 
     # ------------------------------------------------------------------ joints
 

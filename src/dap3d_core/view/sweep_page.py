@@ -59,22 +59,20 @@ class SweepPoints:
     data: "xarray.Dataset"
     names: tuple[str, ...]
     sampled: bool
-    total: int
+    total: int = 0
     samples: tuple[int, ...] = ()
 
     @classmethod
     def of(cls, data: "xarray.Dataset", most: int) -> "SweepPoints":
         """So many points at most, evenly chosen along each axis, with the first and the last."""
-        names, sampled = tuple(varied_of(data)), "point" in data.dims
-        missing = [name for name in names if name not in data.coords]
+        every = cls(data, tuple(varied_of(data)), "point" in data.dims)
+        missing = [name for name in every.names if name not in data.coords]
         if missing:
             what = f"the data set has no values of {missing[0]}: no point can be run again"
             raise ValueError(what)
-        axes = ["point"] if sampled else [n for n in names if n in data.dims]
-        sizes = [data.sizes[axis] for axis in axes]
-        index = dict(zip(axes, evenly(sizes, most), strict=True))
-        samples = tuple(map(int, index["point"])) if sampled else ()
-        return cls(at_places(data, index), names, sampled, math.prod(sizes), samples)
+        index = dict(zip(every.axes, evenly(every.shape, most), strict=True))
+        samples = tuple(map(int, index.get("point", ())))
+        return attrs.evolve(every, data=at_places(data, index), total=every.count, samples=samples)
 
     @property
     def axes(self) -> list[str]:

@@ -1,16 +1,11 @@
 """``dap3d inverse``: the forces of actuators that produce a motion."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
-
-if TYPE_CHECKING:
-    from dap3d_core.cli.framework.execute import Announce, Watch
-    from dap3d_core.result import Result
-    from dap3d_core.simulation import CompiledModel
 
 
 @command(
@@ -48,21 +43,17 @@ def inverse(
     actuator is its quantity actuation: dap3d plot RESULT leg1.actuation.
     """
     import dap3d_core as dap
-    from dap3d_core.cli.console.run_summary import report_run
     from dap3d_core.cli.framework.execute import execute_scene, progress_of
-    from dap3d_core.cli.framework.paths import RESULTS, named_after, writable
+    from dap3d_core.cli.framework.paths import result_target
 
     scene = dap.load(model)
-    target = named_after(model, output, "-inverse")
-    writable(target, force=force, sources=(scene.path,), kinds=RESULTS)
+    target = result_target(model, output, scene.path, force=force, tail="-inverse")
     given: Any = dap.open(motion) if motion.endswith(".nc") else motion
     names = None if actuators is None else [n.strip() for n in actuators.split(",") if n.strip()]
-
-    def find(compiled: "CompiledModel", announce: "Announce", watch: "Watch") -> "Result":
-        return dap.inverse(
+    return execute_scene(
+        ctx, scene, model, target,
+        lambda compiled, announce, watch: dap.inverse(
             compiled, given, names, progress=progress_of(watch), output=target, force=force
-        )
-
-    outcome = execute_scene(ctx, scene, find, {"actuators": "--actuators", "motion": "MOTION"},
-                            allow_code=allow_code)  # fmt: skip
-    return report_run(outcome, model, target, strict=strict)
+        ),
+        {"actuators": "--actuators", "motion": "MOTION"}, strict=strict, allow_code=allow_code,
+    )  # fmt: skip

@@ -1,16 +1,11 @@
 """``dap3d kinematics``: the motion that drivers prescribe, and the forces that it takes."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
-
-if TYPE_CHECKING:
-    from dap3d_core.cli.framework.execute import Announce, Watch
-    from dap3d_core.result import Result
-    from dap3d_core.simulation import CompiledModel
 
 
 @command(
@@ -47,21 +42,17 @@ def kinematics(
     points are located; what was found before a dead point is saved.
     """
     import dap3d_core as dap
-    from dap3d_core.cli.console.run_summary import report_run
     from dap3d_core.cli.framework.execute import execute_scene, progress_of
-    from dap3d_core.cli.framework.paths import RESULTS, named_after, writable
+    from dap3d_core.cli.framework.paths import result_target
 
     scene = dap.load(model)
-    target = named_after(model, output, "-kinematics")
-    writable(target, force=force, sources=(scene.path,), kinds=RESULTS)
+    target = result_target(model, output, scene.path, force=force, tail="-kinematics")
     options.check_settings(scene, dict.fromkeys(options.SETTINGS) | given)
-
-    def find(compiled: "CompiledModel", announce: "Announce", watch: "Watch") -> "Result":
-        return dap.kinematics(
+    return execute_scene(
+        ctx, scene, model, target,
+        lambda compiled, announce, watch: dap.kinematics(
             compiled, progress=progress_of(watch), allow_code=allow_code, announce=announce,
             output=target, force=force, **given,
-        )  # fmt: skip
-
-    outcome = execute_scene(ctx, scene, find, {"over": "--over", "t_end": "--t-end", "dt": "--dt"},
-                            allow_code=allow_code)  # fmt: skip
-    return report_run(outcome, model, target, strict=strict)
+        ),
+        {"over": "--over", "t_end": "--t-end", "dt": "--dt"}, strict=strict, allow_code=allow_code,
+    )  # fmt: skip

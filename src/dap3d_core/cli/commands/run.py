@@ -12,10 +12,7 @@ from dap3d_core.cli.framework.command import command
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from dap3d_core.cli.framework.execute import Announce, Watch
-    from dap3d_core.result import Result
     from dap3d_core.scene import Scene
-    from dap3d_core.simulation import CompiledModel
 
 
 @command(
@@ -57,31 +54,27 @@ def run(
     Ctrl-C ends a run; what was computed until then is saved, and dap3d resume continues it.
     """
     import dap3d_core as dap
-    from dap3d_core.cli.console.run_summary import report_run
     from dap3d_core.cli.framework.execute import execute_scene
-    from dap3d_core.cli.framework.paths import RESULTS, named_after, writable
+    from dap3d_core.cli.framework.paths import result_target
 
     if model is None:
         model, scene, force = _ask(ctx, given, output, force=force)
     else:
         scene = dap.load(model)
     start, source = _start(ctx, start_file, given)
-    target = named_after(model, output)
-    writable(target, force=force, sources=(scene.path, source), kinds=RESULTS)
+    target = result_target(model, output, scene.path, source, force=force)
     options.check_settings(scene, given)
     if given["estimate_error"] is None:
         given["estimate_error"] = "quick"
     given["start"] = start
     names = options.SETTINGS | ({"start": "--from"} if start_file else {})
-
-    def simulate(compiled: "CompiledModel", announce: "Announce", watch: "Watch") -> "Result":
-        return dap.simulate(
+    return execute_scene(
+        ctx, scene, model, target,
+        lambda compiled, announce, watch: dap.simulate(
             compiled, watch=watch, announce=announce, output=target, force=force, **given
-        )
-
-    outcome = execute_scene(ctx, scene, simulate, names, method=given["method"],
-                            allow_code=allow_code)  # fmt: skip
-    return report_run(outcome, model, target, strict=strict)
+        ),
+        names, method=given["method"], strict=strict, allow_code=allow_code,
+    )  # fmt: skip
 
 
 def _start(

@@ -82,12 +82,11 @@ def sweep(
     import dap3d_core as dap
     from dap3d_core.cli.console.progress import PointsProgress
     from dap3d_core.cli.framework.execute import partial_result
-    from dap3d_core.cli.framework.paths import RESULTS, named_after, writable
+    from dap3d_core.cli.framework.paths import result_target
 
     _complete(ctx, given, scheduler)
     scene = dap.load(model)
-    target = named_after(model, output, "-sweep")
-    writable(target, force=given["force"], sources=(scene.path,), kinds=RESULTS)
+    target = result_target(model, output, scene.path, force=given["force"], tail="-sweep")
     code, reason = exit_codes.DONE, ""
     with PointsProgress(quiet=is_quiet()) as progress:
         try:

@@ -7,7 +7,7 @@ from rich.progress import Progress
 from rich.text import Text
 
 from dap3d_core.cli.console.console import Terminal, clean, count, scene_name, seconds
-from dap3d_core.cli.console.progress import LONGEST_PAUSE, ProgressBar, bar_of
+from dap3d_core.cli.console.progress import ProgressBar, bar_of
 
 if TYPE_CHECKING:
     from dap3d_core.report import MeasuredRun, Report
@@ -25,8 +25,7 @@ class ReportProgress(ProgressBar):
 
     def __init__(self) -> None:
         super().__init__()
-        self._last_line = time.monotonic()
-        self._pause = PAUSE
+        self._next_line, self._since = PAUSE, time.monotonic()
 
     def _make_bar(self) -> Progress:
         return bar_of(self._console)
@@ -39,10 +38,9 @@ class ReportProgress(ProgressBar):
                 self._bar.update(self._task, total=1.0, completed=done / total, description=shown)
             else:
                 self._bar.update(self._task, description=shown)
-        elif (now := time.monotonic()) - self._last_line > self._pause:
-            self._last_line, self._pause = now, min(2.0 * self._pause, LONGEST_PAUSE)
+        else:
             left = f", about {seconds(total - done)} left" if total > done else ""
-            self._print(f"{words}{left}")
+            self._print_at_times(f"{words}{left}", time.monotonic() - self._since)
 
 
 def show_report(console: Terminal, report: "Report", command: str, *, with_target: bool) -> None:

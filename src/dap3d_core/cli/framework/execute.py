@@ -11,6 +11,8 @@ from dap3d_core.cli.process.exit_codes import Terminated, refusing
 from dap3d_core.cli.process.streams import is_quiet
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from dap3d_core.cli.console.run_summary import RunOutcome
     from dap3d_core.result import Result
     from dap3d_core.scene import Scene
@@ -23,18 +25,22 @@ if TYPE_CHECKING:
 def execute_scene(
     ctx: click.Context,
     scene: "Scene",
+    model: str,
+    target: "Path",
     run: "Callable[[CompiledModel, Announce, Watch], Result]",
     options_of: Mapping[str, str],
     *,
+    strict: bool,
     allow_code: bool,
     method: str | None = "auto",
-) -> "RunOutcome":
-    """Compile a scene and run it, as ``execute``.
+) -> int:
+    """Compile the scene of a model, run it as ``execute``, and report; returns the exit code.
 
     Args:
         options_of: argument of ``run`` -> option, for mistakes that only the run can see.
     """
     import dap3d_core as dap
+    from dap3d_core.cli.console.run_summary import report_run
     from dap3d_core.cli.framework.options import in_options
 
     def prepare(announce: "Announce") -> "CompiledModel":
@@ -46,7 +52,7 @@ def execute_scene(
         except dap.SceneError as error:
             raise in_options(error, options_of) from error
 
-    return execute(ctx, prepare, named)
+    return report_run(execute(ctx, prepare, named), model, target, strict=strict)
 
 
 def progress_of(watch: "Watch") -> Callable[[float, float], None]:

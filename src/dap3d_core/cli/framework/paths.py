@@ -30,6 +30,14 @@ def named_after(model: str, output: str | None, tail: str = "") -> Path:
     return Path(f"{path.resolve().name if path.exists() else path.name}{tail}.nc")
 
 
+def result_target(
+    model: str, output: str | None, *sources: Path | None, force: bool, tail: str = ""
+) -> Path:
+    """``named_after``, if a result can be written there; sources as of ``writable``."""
+    target = named_after(model, output, tail)
+    return writable(target, force=force, sources=sources, kinds=RESULTS)
+
+
 def output_path(result: str, output: str | None, ending: str) -> Path:
     """The file made from a result: ``output``, by default RESULT with another ending."""
     return Path(output) if output is not None else Path(f"{Path(result).stem}{ending}")

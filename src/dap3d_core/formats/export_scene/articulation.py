@@ -1,5 +1,6 @@
 """A scene as an articulated model: the tree of its joints, loops, and what acts in joints."""
 
+from collections.abc import Iterator
 from math import inf
 from typing import Any
 
@@ -218,18 +219,17 @@ def add_forces(builder: ModelBuilder, scene: Scene) -> None:
     _add_rotors(builder)
 
 
-def _joint_along(
+def _joints_along(
     builder: ModelBuilder, kind: str, bodies: set[str], axis: str
-) -> tuple[SceneJoint, float] | None:
-    """The joint of two bodies with an axis, and whether the axis has its sense, 1 or -1."""
+) -> Iterator[tuple[SceneJoint, float]]:
+    """The joints of two bodies with an axis, and whether the axis has their sense, 1 or -1."""
     elements = builder.elements
     on, u = elements.vector(axis)
     for joint in elements.joints:
         if joint.kind == kind and {joint.body_i, joint.body_j} == bodies:
             along = float((elements.turn(joint.body_i, on) @ u) @ joint.axes[0])
             if abs(abs(along) - 1.0) <= ALIGNED:
-                return joint, float(np.sign(along))
-    return None
+                yield joint, float(np.sign(along))
 
 
 def _of_hinge(builder: ModelBuilder, element: Element) -> tuple[Joint, float, float] | None:
@@ -237,7 +237,7 @@ def _of_hinge(builder: ModelBuilder, element: Element) -> tuple[Joint, float, fl
     elements, fields = builder.elements, element.fields
     marks = [elements.vector(fields[key]) for key in ("v_i", "v_j") if key in fields]
     i, j = [on for on, _ in marks] or [fields["body_i"], fields["body_j"]]
-    found = _joint_along(builder, "revolute", {i, j}, fields["axis"])
+    found = next(_joints_along(builder, "revolute", {i, j}, fields["axis"]), None)
     if found is None:
         return None
     joint, along = found
@@ -254,7 +254,7 @@ def _of_slider(builder: ModelBuilder, element: Element) -> tuple[Joint, float, f
     """The joint of a spring along an axis, the sense of its x, and x where q = 0."""
     elements, fields = builder.elements, element.fields
     i, j = (elements.point(fields[end])[0] for end in ("P_i", "P_j"))
-    found = _joint_along(builder, "prismatic", {i, j}, fields["a_j"])
+    found = next(_joints_along(builder, "prismatic", {i, j}, fields["a_j"]), None)
     if found is None:
         return None
     joint, along = found
@@ -293,7 +293,7 @@ def _add_friction(builder: ModelBuilder, element: Element) -> None:
         bodies = {str(fields["body_i"]), str(fields["body_j"])}
     else:
         bodies = {elements.point(fields["P_i"])[0], elements.vector(fields["a_j"])[0]}
-    found = _joint_along(builder, kind, bodies, fields[axis])
+    found = next(_joints_along(builder, kind, bodies, fields[axis]), None)
     if found is None:
         leave_out(builder.remarks, element, NO_JOINT)
         return
@@ -406,13 +406,7 @@ def _add_rotors(builder: ModelBuilder) -> None:
 
 def _followed(builder: ModelBuilder, fields: dict[str, Any]) -> SceneJoint | None:
     """The joint whose coordinate a follower couples."""
-    elements = builder.elements
-    on, axis = elements.vector(fields["a_j"])
+    bodies = {str(fields["body_i"]), builder.elements.vector(fields["a_j"])[0]}
     kind = "prismatic" if fields.get("along") else "revolute"
-    for joint in elements.joints:
-        ends = {joint.body_i, joint.body_j}
-        if joint.kind == kind and ends == {str(fields["body_i"]), on}:
-            along = float((elements.turn(joint.body_i, on) @ axis) @ joint.axes[0])
-            if abs(along - 1.0) <= ALIGNED:
-                return joint
-    return None
+    along = _joints_along(builder, kind, bodies, fields["a_j"])
+    return next((joint for joint, sense in along if sense > 0.0), None)

@@ -10,7 +10,7 @@ import numpy as np
 
 from dap3d_core.formats.import_scene.joints import LIGHT, add_wheel, from_ground, light, named_ends
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, float_tuple
-from dap3d_core.formats.import_scene.start import AGREE
+from dap3d_core.formats.import_scene.start import AGREE, coordinate
 from dap3d_core.interface.formats.articulation import Actuator, Articulation, Joint, Limits, Tendon
 from dap3d_core.interface.formats.frames import Frame, quaternion
 from dap3d_core.interface.formats.tendon_length import length_of_line, rate_of_line
@@ -69,7 +69,7 @@ def _act_in_joint(
     joint = from_ground(builder, model.joints[actuator.joint])
     bounds = _bounds(control=actuator.control, force=actuator.force, activation=actuator.active)
     if bounds or actuator.activation:
-        q = joint.position[0] if joint.position else 0.0  # the scene counts from where it starts
+        q = coordinate(joint)  # the scene counts from where it starts
         given: dict[str, Any] = {"bias": actuator.bias - actuator.stiffness * q,
                                  "k": actuator.stiffness, "c": actuator.damping}  # fmt: skip
         if actuator.activation:
@@ -222,7 +222,7 @@ def _sum_of_joints(
     length = 0.0
     for name, factor in tendon.terms:
         joint = model.joints[name]
-        length += factor * ((*joint.position, 0.0)[0] + joint.reference)
+        length += factor * (coordinate(joint) + joint.reference)
         if joint.kind == "fixed" or builder.moves_alone(joint):
             continue
         ends = named_ends(builder, from_ground(builder, joint))
@@ -349,7 +349,7 @@ def add_held(builder: SceneBuilder, model: Articulation) -> None:
 def _hold_sum(
     builder: SceneBuilder, model: Articulation, tendon: Tendon, fields: Mapping[str, Any]
 ) -> None:
-    at_start = sum(c * (*model.joints[name].position, 0.0)[0] for name, c in tendon.terms)
+    at_start = sum(c * coordinate(model.joints[name]) for name, c in tendon.terms)
     if abs(at_start - (tendon.rest or 0.0)) > AGREE:
         text = "an equality of a tendon holds the length that it has where the scene starts"
         builder.remarks.translate(tendon.place, text, motion=True)

@@ -27,7 +27,7 @@ from dap3d_core.formats.import_scene.joints import (
 from dap3d_core.formats.import_scene.rigid_groups import STAND_IN, STEPPED, RigidGroup, rigid_groups
 from dap3d_core.formats.import_scene.scene_builder import Names, SceneBuilder, float_tuple
 from dap3d_core.formats.import_scene.spanning_tree import Placed, SpanningTree
-from dap3d_core.formats.import_scene.start import AGREE, SCALAR, couples, start_of
+from dap3d_core.formats.import_scene.start import AGREE, SCALAR, coordinate, couples, start_of
 from dap3d_core.interface.formats.articulation import WORLD, Articulation, Joint, Limits, Link
 from dap3d_core.interface.formats.frames import IDENTITY, Frame, quaternion
 from dap3d_core.interface.formats.joint_inertia import JointInertia
@@ -381,7 +381,7 @@ class _JointCoordinate:
         builder, joint = self.builder, self.joint
         if builder.limits != "hard" or not builder.takes_contacts or joint.kind not in SCALAR:
             return False
-        q = joint.position[0] if joint.position else 0.0
+        q = coordinate(joint)
         if joint in builder.inertia.loops or not limits.contain(q, AGREE * max(1.0, abs(q))):
             return False
         fields = builder.scene.joints[self.name].fields

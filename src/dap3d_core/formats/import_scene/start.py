@@ -25,7 +25,7 @@ def couples(model: Articulation, coupling: Coupling) -> bool:
     return all(one is not None and one.kind in SCALAR for one in ends)
 
 
-def _coordinate(joint: Joint) -> float:
+def coordinate(joint: Joint) -> float:
     """The coordinate of a joint that has one, or had one before it was fixed."""
     return joint.position[0] if joint.position else 0.0
 
@@ -105,7 +105,7 @@ class _Start:
         """Take the ratios of curved couplings where the others are, within their limits."""
         for k, one in enumerate(self.model.couplings):
             if one.curve and couples(self.model, one):
-                q, limits = _coordinate(self.model.joints[one.other]), Limits()
+                q, limits = coordinate(self.model.joints[one.other]), Limits()
                 if self.limited:
                     limits = self.model.joints[one.other].limits[0]
                 self.model.couplings[k] = one.tangent(min(max(q, limits.lower), limits.upper))
@@ -123,14 +123,14 @@ class _Start:
                 ends = [joints.get(name) for name in (one.joint, one.other)]
                 kinds = [None if end is None else end.kind for end in ends]
                 if kinds[1] == "fixed" and kinds[0] in SCALAR:
-                    joint, q = one.joint, one.at(_coordinate(joints[one.other]))
+                    joint, q = one.joint, one.at(coordinate(joints[one.other]))
                 elif kinds[0] == "fixed" and kinds[1] in SCALAR and one.ratio and not one.curve:
-                    joint, q = one.other, (_coordinate(joints[one.joint]) - one.offset) / one.ratio
+                    joint, q = one.other, (coordinate(joints[one.joint]) - one.offset) / one.ratio
                 else:
                     continue
-                if joint in given and abs(_coordinate(joints[joint]) - q) > AGREE:
+                if joint in given and abs(coordinate(joints[joint]) - q) > AGREE:
                     leader = one.other if joint == one.joint else one.joint
-                    self._refuse(leader, joint, "position", q, _coordinate(joints[joint]))
+                    self._refuse(leader, joint, "position", q, coordinate(joints[joint]))
                 text = "a joint that is coupled with a fixed one is fixed"
                 self.remarks.translate(one.place, text)
                 joints[joint], waiting = held(joints[joint], q), True

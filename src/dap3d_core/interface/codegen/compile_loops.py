@@ -43,7 +43,7 @@ def write(type_info: TypeInfo, what: str) -> Loop | None:
     elif what == "turned":
         lines += loop_source.append([f"x_{name}" for name in layout.angles])
     if what in loop_source.JUMP_KINDS:
-        lines += loop_source.jump_lines(type_info, what, kernels)
+        lines += loop_source.jump_lines(type_info, what, has_rows="J" in kernels)
     for name in kernels if what not in loop_source.JUMP_KINDS else ():
         lines.append(f"out = {loop_source.called_with(type_info, name)}")
         lines += loop_source.store(type_info, name)

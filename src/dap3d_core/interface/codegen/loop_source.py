@@ -8,7 +8,7 @@ that of its contact and the first state of the share of that, and for a force th
 whose reactions it reads; its numbers are in ``par`` from ``p1``.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from dap3d_core.interface.codegen.kernel_arguments import KernelArgument, in_order, parameters
@@ -183,30 +183,28 @@ def _shape(count: int) -> tuple[int, ...]:
     return () if count == 1 else (count,)
 
 
-def jump_lines(
-    type_info: TypeInfo, what: str, kernels: Mapping[str, Callable[..., Any]]
-) -> Sequence[str]:
+def jump_lines(type_info: TypeInfo, what: str, *, has_rows: bool) -> Sequence[str]:
     """Lines of a loop for an instance, its quantities being known."""
     switches = len(type_info.outputs["switch"])
     lines = ["seen = whole(out2[1])"]
     lines.append(f"x_crossing = {_tuple([f'out3[seen + {k}]' for k in range(switches)])}")
     if what == "impulse":
-        lines += _impulse_lines(type_info, kernels)
+        lines += _impulse_lines(type_info, has_rows=has_rows)
     else:
-        lines.append(_call("reset", kernels["reset"]))
+        lines.append(f"out = {called_with(type_info, 'reset')}")
         states = type_info.outputs["reset"]
         lines += [f"out1[z0 + {k}] = {path}" for k, path in enumerate(states)]
     return [*lines, f"out2[1] += {switches}.0"]
 
 
-def _impulse_lines(type_info: TypeInfo, kernels: Mapping[str, Callable[..., Any]]) -> Sequence[str]:
+def _impulse_lines(type_info: TypeInfo, *, has_rows: bool) -> Sequence[str]:
     outputs, slots = type_info.outputs, type_info.layout.slots
     impulses, lines = outputs["impulse"], ["place = whole(out2[0])"]
     entries: Sequence[str] = ()
-    if "J" in kernels:
+    if has_rows:
         entries = outputs["J"]
         rows = row_count(outputs, len(slots))
-        lines.append(_call("J", kernels["J"]))
+        lines.append(f"out = {called_with(type_info, 'J')}")
         first = len(impulses)
         lines += [f"out1[place + {first + k}] = {path}" for k, path in enumerate(entries)]
         rates = []
@@ -219,14 +217,9 @@ def _impulse_lines(type_info: TypeInfo, kernels: Mapping[str, Callable[..., Any]
             ]
             rates.append(" + ".join(terms))
         lines.append(f"x_Jv = {_tuple(rates)}")
-    lines.append(_call("impulse", kernels["impulse"]))
+    lines.append(f"out = {called_with(type_info, 'impulse')}")
     lines += [f"out1[place + {k}] = {path}" for k, path in enumerate(impulses)]
     return [*lines, f"out2[0] += {len(impulses) + len(entries)}.0"]
-
-
-def _call(name: str, kernel: Callable[..., Any]) -> str:
-    arguments = ", ".join(f"x_{n}" for n in parameters(kernel))
-    return f"out = kernel_{name}({arguments})"
 
 
 def _tuple(values: Sequence[str]) -> str:

@@ -85,12 +85,7 @@ def bind_functions(
 
 
 def names_behind(type_info: TypeInfo, layout: InstanceLayout) -> dict[str, KernelArgument]:
-    """Names of a function type whose numbers are shifted, with those of its terms.
-
-    Args:
-        type_info: the type.
-        layout: its layout, shifted.
-    """
+    """Names of a function type whose numbers are shifted, with those of its terms."""
     names = namespace(type_info.type, layout)
     if not type_info.terms:
         return names

@@ -31,11 +31,7 @@ def write_with_unknowns(
 ) -> Loop | None:
     """As ``loop_source.write``, of a joint with unknowns.
 
-    Args:
-        type_info: the type.
-        what: the kind of the loop.
-        kernels: those that it calls.
-        wanted: the names that they need.
+    wanted: the names that the kernels need.
     """
     layout, unknowns = type_info.layout, type_info.layout.unknowns
     bounds = bound_values(type_info) if what == "bound" else []
@@ -166,13 +162,11 @@ def kept_value(type_info: TypeInfo, name: str) -> str:
 
 def bound_values(type_info: TypeInfo) -> list[str]:
     """Distances of the unknowns from their bounds, but for those that are periodic."""
-    values = []
-    for name in type_info.layout.unknowns:
-        if name not in _joint(type_info).periodic:
-            for suffix, sign in ((LEAST, ""), (GREATEST, "-")):
-                at = type_info.layout.numbers[f"{name}{suffix}"][0]
-                values.append(f"{sign}(x_{name} - par[p1 + {at}])")
-    return values
+    signs, numbers = {"least": "", "greatest": "-"}, type_info.layout.numbers
+    return [
+        f"{signs[words]}(x_{name} - par[p1 + {numbers[field][0]}])"
+        for name, words, field in bound_words(type_info)
+    ]
 
 
 def bound_words(type_info: TypeInfo) -> list[tuple[str, str, str]]:

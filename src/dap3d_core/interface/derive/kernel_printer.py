@@ -3,6 +3,7 @@
 import itertools
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from functools import partialmethod
 from typing import Any
 
 import sympy
@@ -31,14 +32,7 @@ class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
     def _print_Integer(self, number: Any) -> str:
         return f"{int(number)}.0"
 
-    def _print_Zero(self, number: Any) -> str:
-        return "0.0"
-
-    def _print_One(self, number: Any) -> str:
-        return "1.0"
-
-    def _print_NegativeOne(self, number: Any) -> str:
-        return "-1.0"
+    _print_Zero = _print_One = _print_NegativeOne = _print_Integer
 
     def _print_Rational(self, number: Any) -> str:
         return f"({number.p}.0 / {number.q}.0)"
@@ -72,30 +66,24 @@ class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
     def _print_Branch(self, branch: Any) -> str:
         return self._call("where", *branch.args)
 
-    def _print_And(self, conditions: Any) -> str:
-        return self._joined(conditions, " & ")
+    def _joined(self, operator: str, conditions: Any) -> str:
+        return f"({operator.join(map(self._print, conditions.args))})"
 
-    def _print_Or(self, conditions: Any) -> str:
-        return self._joined(conditions, " | ")
-
-    def _print_Xor(self, conditions: Any) -> str:
-        return self._joined(conditions, " ^ ")
+    _print_And = partialmethod(_joined, " & ")
+    _print_Or = partialmethod(_joined, " | ")
+    _print_Xor = partialmethod(_joined, " ^ ")
 
     def _print_Not(self, condition: Any) -> str:
         return f"({self._print(condition.args[0])} ^ True)"
-
-    def _joined(self, conditions: Any, operator: str) -> str:
-        return f"({operator.join(map(self._print, conditions.args))})"
 
     def _print_Function(self, call: Any) -> str:
         name = type(call).__name__
         if name in WORDS:
             return self._call(name, *call.args)
-        if isinstance(call, sympy.core.function.AppliedUndef) or hasattr(call, "fdiff"):
-            if type(call).__module__.startswith("sympy"):
-                raise DerivationError(f"kernels have no {name}; write the formulas by hand")
-            return f"{name}({', '.join(map(self._print, call.args))})"
-        raise DerivationError(f"kernels have no {name}; write the formulas by hand")
+        is_given = isinstance(call, sympy.core.function.AppliedUndef) or hasattr(call, "fdiff")
+        if not is_given or type(call).__module__.startswith("sympy"):
+            raise DerivationError(f"kernels have no {name}; write the formulas by hand")
+        return f"{name}({', '.join(map(self._print, call.args))})"
 
     _print_sin = _print_cos = _print_tanh = _print_atan2 = _print_Function
     _print_tan = _print_sinh = _print_cosh = _print_atan = _print_Function

@@ -71,10 +71,7 @@ def check_state_names(
 ) -> None:
     """Refuses states with names that kernels or results have for something else.
 
-    Args:
-        type_: the type.
-        layout: storage of its instances.
-        others: the names its fields offer.
+    others: the names its fields offer.
 
     Raises:
         PluginError: with file, type, name and remedy.

@@ -178,9 +178,7 @@ class JointInertia:
 def motions(joint: Joint, at: Frame) -> tuple[Floats, Frame]:
     """Rates of a joint's child for each coordinate, and the pose of its frame there.
 
-    Args:
-        joint: the joint, where it starts.
-        at: the joint's frame on the parent.
+    at: the joint's frame on the parent.
 
     Returns:
         (6, coordinates): velocity of the point at the origin, and angular velocity.

@@ -32,9 +32,7 @@ _LAYOUT = struct.Struct("<8sIIQQII")
 def check_signature(file: Path, kind: str = "result") -> None:
     """Refuses a file without the signature of HDF5.
 
-    Args:
-        file: its path.
-        kind: what was expected, for the error.
+    kind: what was expected, for the error.
 
     Raises:
         ResultError: there is no such file, it cannot be read, or is of another format.
@@ -74,9 +72,6 @@ def write_checksums(file: Path, rows: int, *, is_whole: bool) -> None:
 
 def check_checksums(file: Path) -> None:
     """Refuses a file that differs from its checksums. Older files without a trailer pass.
-
-    Args:
-        file: has the signature of HDF5.
 
     Raises:
         ResultError: it is cut off or damaged, or the system refuses.

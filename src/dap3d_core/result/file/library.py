@@ -108,9 +108,7 @@ def opened(path: Path, mode: Literal["w", "r+", "r"] = "r") -> Any:
 def created(path: Path, target: Path) -> Iterator[Any]:
     """A netCDF4.Dataset of a new file to write, closed at the end.
 
-    Args:
-        path: the new file.
-        target: name of the file in error messages.
+    target: name of the file in error messages.
 
     Raises:
         ResultError: the library, or the system, refuses.

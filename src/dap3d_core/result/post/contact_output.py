@@ -63,12 +63,7 @@ def units_of(*, turns: bool, alone: bool) -> dict[str, str]:
 
 
 def contact_outputs(evaluator: "Evaluator", arrays: "Arrays") -> dict[str, ContactOutput]:
-    """Outputs of all points of contacts of a model, by their names.
-
-    Args:
-        evaluator: evaluates the model.
-        arrays: of a result.
-    """
+    """Outputs of all points of contacts of a model, by their names."""
     from dap3d_core.formulations.contacts import contact_table as rows
 
     table = rows.ContactTable(evaluator)

@@ -174,11 +174,11 @@ def actions_of(
     model: Model, u: Floats, group: Group, index: int, wrenches: Floats
 ) -> dict[str, Reaction]:
     """Wrenches (nt, slots, 6) of an instance of a group, by slot."""
-    layout, p = group.type_info.layout, split(u)[1]
+    slots, numbers, p = group.type_info.layout.slots, group.of_instance(index), split(u)[1]
     names, actions = ("ground", *model.body_names), {}
-    for n, (slot, body) in enumerate(zip(layout.slots, group.bodies[index], strict=True)):
-        at, shape = layout.numbers.get(f"P_{slot}", (0, ()))
-        local = read_only(group.numbers[index, at : at + 3]) if shape == (3,) else None
+    for n, (slot, body) in enumerate(zip(slots, group.bodies[index], strict=True)):
+        point = numbers.get(f"P_{slot}")
+        local = None if point is None or point.shape != (3,) else read_only(point)
         pose = p[:, body - 1] if body else np.broadcast_to([1.0, 0.0, 0.0, 0.0], (len(u), 4))
         force, moment = read_only(wrenches[:, n, :3]), read_only(wrenches[:, n, 3:])
         actions[slot] = Reaction(names[body], force, moment, pose, local)
@@ -341,11 +341,8 @@ def _along(
     group: Group, index: int, u: Floats, v_dot: Floats, force: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Length, its rate and the tension (nt,) of an element between points P_i and P_j."""
-    numbers, ends = group.type_info.layout.numbers, []
-    for end in ("P_i", "P_j"):
-        at, _ = numbers[end]
-        ends.append(group.numbers[index, at : at + 3])
-    local = np.array(ends)
+    numbers = group.of_instance(index)
+    local = np.array([numbers["P_i"], numbers["P_j"]])
     r, v = (motion_of(group.bodies[index], local, u, v_dot, level) for level in (0, 1))
     d, d_dot = r[:, 1] - r[:, 0], v[:, 1] - v[:, 0]
     length = np.linalg.norm(d, axis=1)

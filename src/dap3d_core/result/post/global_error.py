@@ -5,6 +5,8 @@ difference of the two is the error of the coarser one, up to that smaller part. 
 not a bound: it does not see an error that both runs have, in a model or past an event.
 """
 
+from typing import Any
+
 import attrs
 import numpy as np
 
@@ -20,6 +22,11 @@ FEWEST, DECADES = 10, 3.0
 #: Least sizes, as a fraction of the scene's: of its length, of 1, and of the speeds that cover
 #: those in the whole run.
 SMALLEST_PART = 1e-3
+
+
+def _part(place: int, meaning: str) -> Any:
+    """The attribute for a part of the state."""
+    return property(lambda estimate: split(estimate.u)[place], doc=meaning)
 
 
 @attrs.frozen(eq=False)
@@ -38,25 +45,10 @@ class ErrorEstimate:
     size: dict[str, float]
     length: float = 1.0
 
-    @property
-    def r(self) -> Floats:
-        """(nt, n, 3) error of the positions of the mass centres, m."""
-        return split(self.u)[0]
-
-    @property
-    def p(self) -> Floats:
-        """(nt, n, 4) error of the Euler parameters; p and -p are one orientation."""
-        return split(self.u)[1]
-
-    @property
-    def rd(self) -> Floats:
-        """(nt, n, 3) error of the velocities, m/s."""
-        return split(self.u)[2]
-
-    @property
-    def w(self) -> Floats:
-        """(nt, n, 3) error of the angular velocities, rad/s, global axes."""
-        return split(self.u)[3]
+    r = _part(0, "(nt, n, 3) error of the positions of the mass centres, m.")
+    p = _part(1, "(nt, n, 4) error of the Euler parameters; p and -p are one orientation.")
+    rd = _part(2, "(nt, n, 3) error of the velocities, m/s.")
+    w = _part(3, "(nt, n, 3) error of the angular velocities, rad/s, global axes.")
 
     @property
     def largest(self) -> dict[str, float]:

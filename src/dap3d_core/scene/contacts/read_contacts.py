@@ -42,12 +42,7 @@ def read_collisions(
 ) -> CollisionShapes | None:  # fmt: skip
     """The shapes that collide; None where there are none, mistakes are reported.
 
-    Args:
-        report: takes the mistakes; its scene is read.
-        shapes: of the scene.
-        index: name of a body -> its index, ground 0.
-        joints: bodies of one joint do not meet, but ground.
-        materials: of the scene.
+    index: name of a body -> its index, ground 0.
     """
     given = report.scene.collisions or Collisions()
     chosen = _bodies(report, given.bodies, index)

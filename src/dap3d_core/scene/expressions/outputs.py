@@ -84,10 +84,7 @@ def outputs_of(outputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> dic
 def fault_of_quantity(scene: SceneTables, name: Any, but: str = "") -> str:
     """The reason why something cannot name an output or an input; "" where it can.
 
-    Args:
-        scene: the scene.
-        name: the name.
-        but: the table that it stands in.
+    but: the table that it stands in.
     """
     if fault := fault_of_name(name) or fault_of_word(name):
         return fault

@@ -217,12 +217,7 @@ def named_row(
 ) -> int | Fault | None:
     """The row of F that a text in place of a number names; None where it is a number, "1500 rpm".
 
-    Args:
-        report: knows names that are near.
-        spec: of the field.
-        text: as written.
-        rows: function, input -> rows of F by name.
-        read: reads a number.
+    rows: function, input -> rows of F by name.
     """
     found = [kind for kind in rows if text in rows[kind]]
     if len(found) > 1:

@@ -71,10 +71,7 @@ class Collector(MistakeList):
     def add_missing_type(self, key: Key, fields: Mapping[str, Any], what: str) -> None:
         """Report that an element has no type; or the key that is its misspelling, as ``typ``.
 
-        Args:
-            key: of the element.
-            fields: as written.
-            what: that it is required, and what it may be.
+        what: that it is required, and what it may be.
         """
         near = [field for field in fields if self.nearest(field, ("type",))]
         if near:

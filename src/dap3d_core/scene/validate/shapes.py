@@ -154,9 +154,7 @@ SHAPES: Mapping[str, Mapping[str, Field]] = {
 def read_shapes(report: Collector, index: Mapping[str, int]) -> list[Shape]:
     """The shapes of a scene that are without mistakes; mistakes are reported.
 
-    Args:
-        report: takes the mistakes; its scene is read.
-        index: name of a body -> its index, ground 0.
+    index: name of a body -> its index, ground 0.
     """
     shapes = (_shape(report, index, element) for element in report.scene.shapes.values())
     return [shape for shape in shapes if shape is not None]

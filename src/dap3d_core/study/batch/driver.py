@@ -15,7 +15,7 @@ from dap3d_core.integrators.stepping.integration_state import FINISHED, NOISE, R
 from dap3d_core.kernels.runtime.array_struct import Arrays, Matrix
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.model.groups import Floats, Integers
-from dap3d_core.study.batch.initial_state import LEAST_PIVOT, OPEN, SIZE, STARTING
+from dap3d_core.study.batch.initial_state import LEAST_PIVOT, OPEN, SIZE, STARTING, copy_into
 
 # Entries of ``at``: the current point, whether its run has begun, how to start; whether states are
 # in coordinates of the formulation's own, and rows have to be brought to those of bodies.
@@ -49,13 +49,6 @@ class Points(Arrays):
     first_lengths: Matrix
     rows: Matrix  # (k nt, width) reported rows
     diagnostics: Matrix  # (k, COLUMNS); SIZE is given
-
-
-@compiled
-def copy_into(target: Any, source: Any) -> None:
-    """Copy a vector."""
-    for k in range(source.shape[0]):
-        target[k] = source[k]
 
 
 @compiled

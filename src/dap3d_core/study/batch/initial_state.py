@@ -49,6 +49,13 @@ SIZE, C_BEFORE, V_BEFORE, C_AFTER, V_AFTER, PASSES, LEAST_PIVOT, OPEN, STARTING 
 
 
 @compiled
+def copy_into(target: Any, source: Any) -> None:
+    """Copy a vector."""
+    for k in range(source.shape[0]):
+        target[k] = source[k]
+
+
+@compiled
 def zero_rows(system: System, rows: Floats) -> None:
     """Zero the rows of D^ that are marked with 1."""
     blocks, D = system.blocks, system.D
@@ -157,7 +164,7 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
         out[PASSES] += 1.0
     if is_differentiated() and worst < 1e100:  # derivatives of a start that values leave as it is
         kept = out[STARTING + system.multipliers.shape[0] :]
-        keep(kept, y)
+        copy_into(kept, y)
         correct_positions(t, y, out, system, loops)
         put_back(y, kept)
         place(t, y, system, loops)
@@ -170,7 +177,7 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
         place_bodies(y, system.body, system.metric)
     elif is_differentiated():
         kept = out[STARTING + system.multipliers.shape[0] :]
-        keep(kept, y)
+        copy_into(kept, y)
         correct_velocities(y, system)
         put_back(y, kept)
         place_bodies(y, system.body, system.metric)
@@ -193,13 +200,6 @@ def correct_velocities(y: Floats, system: System) -> None:
     """Correct the velocities of a start by ``residual``."""
     constraints.correct(system)
     apply_velocity_change(y, system.metric, system.change)
-
-
-@compiled_into
-def keep(kept: Floats, y: Floats) -> None:
-    """Keep a state."""
-    for k in range(y.shape[0]):
-        kept[k] = y[k]
 
 
 @compiled_into

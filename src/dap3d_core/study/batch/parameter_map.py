@@ -21,10 +21,17 @@ from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.interface.element_states import INITIAL, TOLERANCE
 from dap3d_core.interface.examine.constants import prepared
 from dap3d_core.interface.fields import FieldSpec, specs_of
-from dap3d_core.interface.types import BodyPose, Function, TypeBase, acts_on_all, turns_of
+from dap3d_core.interface.types import (
+    BodyPose,
+    Function,
+    TypeBase,
+    acts_on_all,
+    has_prepare,
+    turns_of,
+)
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS
 from dap3d_core.model import Group
-from dap3d_core.model.groups import Floats, Integers
+from dap3d_core.model.groups import Floats, Integers, as_object
 from dap3d_core.model.model import ReferencePoses
 from dap3d_core.model.scales import Scales, gyrations_of, moments_of, scales_of
 from dap3d_core.model.state_layout import join, split, u_from_y, y_from_u
@@ -233,12 +240,7 @@ class ParameterMap:
         path, index = parameter.path, parameter.index
         _, name, field = path
         body = self._checked.body_index[name]
-        read = {
-            part
-            for instance in self._elements
-            for b, part in self._reads(instance).poses
-            if b == body
-        }
+        read = {part for one in self._elements for b, part in self._reads(one).poses if b == body}
         by_mass = str(self._checked.scene.simulation.correct_metric) == "mass"
         if field == "mass":
             limits = FieldSpec("number", 1.0, positive=True)
@@ -262,8 +264,7 @@ class ParameterMap:
 
     def _of_element(self, parameter: SceneParameter) -> MappedParameter:
         table, name, field = parameter.path
-        named = (i for i in getattr(self._checked, table) if i.name == name)
-        instance = next(named, None)
+        instance = next((i for i in getattr(self._checked, table) if i.name == name), None)
         if instance is None:  # a rigid stop, which is a contact
             raise NotCopiedError
         type_: Any = instance.type_info.type
@@ -452,7 +453,7 @@ def dependence_of(
     fields: set[str] = set()
     read: set[tuple[int, str]] = set()
     constants: set[str] = set()
-    if type_.prepare not in (base.__dict__.get("prepare") for base in TypeBase.__subclasses__()):
+    if has_prepare(type_):
         slots = instance.type_info.layout.slots
         each = acts_on_all(type_)
         for bodies in turns_of(type_, body_count) if each else [instance.bodies]:
@@ -467,9 +468,7 @@ def dependence_of(
 def _recorded(instance: Instance, read: set[str]) -> Any:
     """The element as ``prepare`` gets it, of a class that records reads of its fields."""
     type_: Any = instance.type_info.type
-    specs = specs_of(type_)
-    ends = ("P_i", "P_j") if any(s.kind == "vector2" for s in specs.values()) else ()
-    names = frozenset((*specs, *ends))
+    names = {*specs_of(type_), "P_i", "P_j"}
     initial = set(read)
 
     class Recorded(type_):  # type: ignore[misc]
@@ -478,9 +477,7 @@ def _recorded(instance: Instance, read: set[str]) -> Any:
                 read.add(name)
             return super().__getattribute__(name)
 
-    element = Recorded(**{name: v for name, v in instance.values.items() if name in specs})
-    for end in ends:
-        setattr(element, end, instance.values[end])
+    element = as_object(instance, Recorded)
     read.intersection_update(initial)  # without what its construction has read
     return element
 

@@ -323,10 +323,7 @@ class DifferentiatedRun(Run):
 
         When that is shows in the instants that lead there; the last ones are by rounding of shares.
 
-        Args:
-            of: what happened at an instant.
-            crossed: the switches that did so there.
-            given: the state before, and time.
+        given: the state before, and time.
         """
         t, size = given[-1], len(given) - 2 - len(self.evaluator.states)
         far, most = np.abs(self.present.y - given[:-1])[:size], np.max(np.abs(given[:size]))

@@ -295,9 +295,6 @@ class FileLock:
     def __init__(self, target: Path) -> None:
         """Take it.
 
-        Args:
-            target: the file that the sweep is to write.
-
         Raises:
             ResultError: another sweep has it; the folder cannot be written to.
         """

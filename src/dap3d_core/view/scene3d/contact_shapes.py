@@ -29,10 +29,7 @@ def contact_shapes(model: Model) -> list[Shape]:
 def _of_contact(group: Group, k: int, name: str) -> Iterator[Shape]:
     type_info = group.type_info
     bodies = dict(zip(type_info.layout.slots, map(int, group.bodies[k]), strict=True))
-    numbers = {
-        field: group.numbers[k, at : at + int(np.prod(shape))].reshape(shape)
-        for field, (at, shape) in type_info.layout.numbers.items()
-    }
+    numbers = group.of_instance(k)
     for slot, kind in type_info.type.surfaces.items():  # type: ignore[attr-defined]
         own = {
             field: numbers.get(f"{field}_{slot}", numbers.get(field))
@@ -53,9 +50,7 @@ def _plain(value: Any) -> Any:
 def _drawn(kind: str, own: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     """Types of shapes and their fields that draw a surface.
 
-    Args:
-        kind: one of ``interface.contacts.contact.SURFACES``.
-        own: its fields.
+    kind: one of ``interface.contacts.contact.SURFACES``.
     """
     at, axis, radius = own["P"], own["a"], own["radius"]
     match kind:

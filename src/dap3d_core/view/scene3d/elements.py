@@ -97,11 +97,9 @@ def gravity_of(model: Model) -> Point | None:
     It is that of a force on each body with ``gravity`` and the direction ``wgt``, as ``weight``.
     """
     for group in model.forces:
-        numbers = group.type_info.layout.numbers
+        numbers = group.of_instance(0)
         if getattr(group.type_info.type, "each_body", False) and {"gravity", "wgt"} <= set(numbers):
-            g = group.numbers[0, numbers["gravity"][0]]
-            at = numbers["wgt"][0]
-            return floats_of(g * group.numbers[0, at : at + 3])
+            return floats_of(numbers["gravity"] * numbers["wgt"])
     return None
 
 
@@ -124,19 +122,18 @@ def _geometry(group: Group, member: int, name: str) -> ElementGeometry:
     numbers: dict[str, float] = {}
     chain: list[Located] = []
     lists = tuple(f"{field}_" for field, spec in specs.items() if spec.kind == "points")
-    for field, (at, shape) in layout.numbers.items():
-        values = floats_of(group.numbers[member, at : at + (3 if shape else 1)])
+    for field, value in group.of_instance(member).items():
         kind = specs[field].kind if field in specs else ""
         slot = slot_of(field)
         is_end = has_ends and field in ("P_i", "P_j")
-        if shape == (3,) and slot in bodies and (kind == "point" or is_end):
-            points[slot] = bodies[slot], values
+        if value.shape == (3,) and slot in bodies and (kind == "point" or is_end):
+            points[slot] = bodies[slot], floats_of(value)
             if field.startswith(lists):
                 chain.append(points[slot])
-        elif shape == (3,) and field in on:
-            vectors[field] = on[field], values
-        elif shape == () and kind == "number":
-            numbers[field] = values[0]
+        elif value.shape == (3,) and field in on:
+            vectors[field] = on[field], floats_of(value)
+        elif value.shape == () and kind == "number":
+            numbers[field] = float(value)
     symbol = group.type_info.type.symbol
     return ElementGeometry(
         name, group.keyword, symbol, bodies, points, vectors, numbers, has_ends, chain
