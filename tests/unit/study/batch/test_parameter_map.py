@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import dap3d_core as dap
+from support.plain import jit_is_on
 
 
 def test_points_of_a_slider_move_the_spring_that_names_it():
@@ -23,8 +24,9 @@ def test_points_of_a_slider_move_the_spring_that_names_it():
         wanted = rest + (r_0 - rest) * c + v_0 / np.sqrt(k / mass) * s
         swept = dap.sweep(scene, {path: places}, outputs="slide.r.x", t_end=t, dt=t, rtol=1e-10)
         assert swept["slide.r.x"].values == pytest.approx(wanted, abs=1e-9)
-        slopes = dap.sensitivities(scene, [path], t_end=t, dt=t, rtol=1e-10)
-        assert slopes.final("slide.r.x") == pytest.approx([-sign * (1.0 - c)], abs=1e-8)
+        if jit_is_on():  # derivatives are of compiled code
+            slopes = dap.sensitivities(scene, [path], t_end=t, dt=t, rtol=1e-10)
+            assert slopes.final("slide.r.x") == pytest.approx([-sign * (1.0 - c)], abs=1e-8)
 
 
 def test_points_beside_what_a_joint_brings():
