@@ -412,7 +412,7 @@ def _point_fields(checked: ValidatedScene, instance: Instance, point: str) -> It
         if spec.kind == "point" and fields.get(field) == point:
             yield field
         if spec.kind == "vector2":
-            declared = vectors2.get(fields.get(field))
+            declared = vectors2.get(fields.get(field, ""))
             for end in ("P_i", "P_j"):
                 given = getattr(declared, end) if declared else fields.get(end)
                 if given == point:

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from support.plain import jit_is_on
 
 import dap3d_core as dap
-from support.plain import jit_is_on
 
 
 def test_points_of_a_slider_move_the_spring_that_names_it():
