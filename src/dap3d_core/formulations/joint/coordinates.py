@@ -214,7 +214,7 @@ class TreeCoordinates(Coordinates):
 
     def placer(self, y: Floats) -> Callable[[], object]:
         """As of ``Coordinates``."""
-        out = np.empty(self.evaluator.model.u0.size + 1)
+        out = np.empty(self.evaluator.model.integrated_layout.size)
         return prepared(body_state, y, out, self.evaluator.system)
 
     def continued(self, expected: Floats, y: Floats) -> Floats:

@@ -156,7 +156,7 @@ class Reader:
             type_info, bodies = completed, tuple(reading.bodies)
         functions = tuple([reading.rows.get(name, 0) for name in type_info.layout.functions])
         others = tuple([reading.others[name] for name in type_info.layout.others])
-        return Instance(element.name, type_info, bodies, functions, values, others)
+        return Instance(element.name, type_info, bodies, functions, values, others, element.fields)
 
     def other_kind(self, field: str) -> str:
         """Where an unknown field is one of the type of the other kind with the same keyword."""

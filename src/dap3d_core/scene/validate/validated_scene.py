@@ -1,6 +1,6 @@
 """The validated scene, from which the model is built: arrays and instances, names resolved."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -32,6 +32,7 @@ class Instance:
             length; a vector2 gives the two points ``P_i`` and ``P_j``; numbers: floats, or None
             where ``prepare`` returns them; vec3, table: tuples; matrix: three rows; references to
             bodies, functions, inputs and joints: words; choices: words, False or True.
+        fields: field -> as written, with those of the joints that it names.
         terms: of a function that combines functions, those.
         breaks_at: N, of a joint that may be released: it ends where its force becomes larger, by
             itself never where this is inf; None of what holds throughout.
@@ -44,6 +45,7 @@ class Instance:
     functions: tuple[int, ...]
     values: dict[str, Any]
     others: tuple[int, ...] = ()
+    fields: Mapping[str, Any] = attrs.field(factory=dict, repr=False)
     terms: tuple["Instance", ...] = ()
     breaks_at: float | None = None
     active: "Expression | None" = None

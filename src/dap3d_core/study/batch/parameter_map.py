@@ -406,17 +406,16 @@ def _point_fields(checked: ValidatedScene, instance: Instance, point: str) -> It
     Raises:
         NotCopiedError: the point is in a list of points.
     """
-    scene, table = checked.scene, f"{instance.type_info.type.kind}s"
-    element = getattr(scene, table)[instance.name]
-    if any(isinstance(v, list | tuple) and point in v for v in element.fields.values()):
+    fields, vectors2 = instance.fields, checked.scene.vectors2
+    if any(isinstance(v, list | tuple) and point in v for v in fields.values()):
         raise NotCopiedError
     for field, spec in specs_of(instance.type_info.type).items():
-        if spec.kind == "point" and element.fields.get(field) == point:
+        if spec.kind == "point" and fields.get(field) == point:
             yield field
         if spec.kind == "vector2":
-            declared = scene.vectors2.get(element.fields.get(field))
+            declared = vectors2.get(fields.get(field, ""))
             for end in ("P_i", "P_j"):
-                given = getattr(declared, end) if declared else element.fields.get(end)
+                given = getattr(declared, end) if declared else fields.get(end)
                 if given == point:
                     yield end
 

@@ -55,6 +55,16 @@ def test_evaluations_at_a_state_know_the_states_of_elements():
     assert rates[0] == pytest.approx(rates[1], rel=1e-14)
 
 
+def test_bodies_are_placed_in_an_array_with_room_for_states_of_elements():
+    """Compiled code writes the states behind the bodies, beyond an array that is too short."""
+    evaluator = CompiledModel(state_types.stated(), method="joint").evaluator
+    y = evaluator.coordinates.start(evaluator.model.u0)
+    place = evaluator.coordinates.placer(y)
+    place()
+    _, placed, _ = getattr(place, "arguments", None) or place.args
+    assert np.array_equal(placed, evaluator.body_state(y))
+
+
 @pytest.mark.every(4)
 @pytest.mark.parametrize("ends", [("a", "b"), ("b", "a")])
 def test_a_weld_of_free_bodies_joins_them_either_way(ends):
