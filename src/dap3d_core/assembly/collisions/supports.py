@@ -22,8 +22,6 @@ from dap3d_core.scene.contacts.collision_shapes import (
 FLAT = 1e-9
 #: Points of a rim that stand for it, and of a face; with those that clipping adds.
 RIM, CORNERS, CLIPPED_CORNERS = 8, 16, 32
-#: Less than what the next of these points is below one that is farthest, as a part of the radius.
-NEXT_ON_RIM = 0.25
 
 
 @compiled
@@ -118,8 +116,8 @@ def near_support(
     z = sign * dot_axis(u, 2, d[0], d[1], d[2])
     across = math.sqrt(x * x + y * y)
     a, b = (x / across, y / across) if across > FLAT else (1.0, 0.0)
-    is_steep = what == CYLINDER and across > FLAT  # other points of the rim are far below the first
-    is_alone = is_steep and NEXT_ON_RIM * h[0] * across > band
+    is_steep = what == CYLINDER and across > FLAT  # the rim's next point is 0.29 radii below then
+    is_alone = is_steep and 0.25 * h[0] * across > band
     total = 2 if what == CAPSULE or is_alone else 2 * RIM if what == CYLINDER else 8
     if what == HULL:
         total = shapes.corners[k, 1]

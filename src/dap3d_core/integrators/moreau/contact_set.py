@@ -305,9 +305,8 @@ def evaluate_rows(
         call_kinds(POSITION, POSITION, t, system, loops, residual, residual, residual)
     call_kinds(ACCELERATION, ACCELERATION, t, system, loops, system.D, system.gamma, system.nu)
     for q in range(s.row_place.size):
-        row, D = s.D[q], system.D[s.row_place[q] :]
         for k in range(6):
-            row[k] = D[k]
+            s.D[q, k] = system.D[s.row_place[q] + k]
 
 
 @compiled

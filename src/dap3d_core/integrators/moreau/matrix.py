@@ -199,17 +199,15 @@ def assemble(s: StepArrays, weight: float, feels: float) -> None:
         elif s.kind[c] != CONE and feels > 0.0:
             add_load(s, c, weight)
     for n in range(s.row_count):
-        k, width = s.rows[n], s.width
-        first, last, scale = s.row_start[k], s.row_start[k + 1], weight * s.s[k]
-        for p in range(first, last):
-            D = s.D[p]
-            for q in range(first, last):
-                at, E = block_at(s, s.place[s.row_body[p]], s.place[s.row_body[q]]), s.D[q]
+        k = s.rows[n]
+        for p in range(s.row_start[k], s.row_start[k + 1]):
+            for q in range(s.row_start[k], s.row_start[k + 1]):
+                start = block_at(s, s.place[s.row_body[p]], s.place[s.row_body[q]])
                 for i in range(6):
-                    part = scale * D[i]
+                    at = start + i * s.width
+                    part = weight * s.s[k] * s.D[p, i]
                     for j in range(6 if part != 0.0 else 0):
-                        K[at + j] += part * E[j]
-                    at += width
+                        K[at + j] += part * s.D[q, j]
 
 
 @compiled

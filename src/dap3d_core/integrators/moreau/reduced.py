@@ -58,9 +58,8 @@ def put_felt(s: StepArrays, passes: int) -> None:
         c = s.chosen[p]
         for r in range(3):
             column = 3 * p + r
-            answer = s.answer[column]
             for n in range(s.row_count):
-                s.lead[s.rows[n]] = answer[s.rows[n]] = 0.0
+                s.lead[s.rows[n]] = s.answer[column, s.rows[n]] = 0.0
             for k in range(3 * m):
                 s.felt[column, k] = s.felt[k, column] = 0.0
             if is_idle(s, c, r):
@@ -79,7 +78,7 @@ def put_felt(s: StepArrays, passes: int) -> None:
                     s.pull[k] = newton.speed_of(s, k, s.delta)
                     s.lead[k] -= STIFF * s.s[k] * s.pull[k]
             for n in range(s.row_count):
-                answer[s.rows[n]] = s.lead[s.rows[n]]
+                s.answer[column, s.rows[n]] = s.lead[s.rows[n]]
             for q in range(p + 1):
                 for i in range(3 if q < p else r + 1):
                     if not is_idle(s, s.chosen[q], i):
@@ -96,12 +95,11 @@ def is_idle(s: StepArrays, c: int, r: int) -> bool:
 def put_mutual(s: StepArrays, q: int, i: int, column: int) -> None:
     """Put what direction i of a contact and that of a column, solved last, feel of each other."""
     c, row, felt = s.chosen[q], 3 * q + i, 0.0
-    answer, pull = s.answer[row], s.pull
     J, first, second = s.J[c], s.delta[s.bodies[c, 0]], s.delta[s.bodies[c, 1]]
     for k in range(6):
         felt += J[12 * i + k] * first[k] + J[12 * i + 6 + k] * second[k]
     for n in range(s.row_count):
-        felt += answer[s.rows[n]] * pull[s.rows[n]]
+        felt += s.answer[row, s.rows[n]] * s.pull[s.rows[n]]
     s.felt[row, column] = s.felt[column, row] = felt
 
 
@@ -109,15 +107,13 @@ def put_mutual(s: StepArrays, q: int, i: int, column: int) -> None:
 def solve_bodies(s: StepArrays) -> None:
     """Overwrite ``delta`` with K^-1 times it."""
     for q in range(s.used_count):
-        row, own = s.delta[s.used[q]], s.change[6 * q :]
         for k in range(6):
-            own[k] = row[k]
+            s.change[6 * q + k] = s.delta[s.used[q], k]
     matrix.solve_factored(s)
     zero(s.delta[0])
     for q in range(s.used_count):
-        row, own = s.delta[s.used[q]], s.change[6 * q :]
         for k in range(6):
-            row[k] = own[k]
+            s.delta[s.used[q], k] = s.change[6 * q + k]
 
 
 @compiled
@@ -139,9 +135,8 @@ def meet_joints(s: StepArrays) -> None:
         k = s.rows[n]
         s.y[k] += s.lead[k] - STIFF * s.s[k] * newton.speed_of(s, k, s.delta)
     for q in range(s.used_count):
-        v, change = s.v[s.used[q]], s.delta[s.used[q]]
         for k in range(6):
-            v[k] += change[k]
+            s.v[s.used[q], k] += s.delta[s.used[q], k]
 
 
 @compiled
