@@ -116,12 +116,14 @@ def near_support(
     z = sign * dot_axis(u, 2, d[0], d[1], d[2])
     across = math.sqrt(x * x + y * y)
     a, b = (x / across, y / across) if across > FLAT else (1.0, 0.0)
-    total = 2 if what == CAPSULE else 2 * RIM if what == CYLINDER else 8
+    is_steep = what == CYLINDER and across > FLAT  # the rim's next point is 0.29 radii below then
+    is_alone = is_steep and 0.25 * h[0] * across > band
+    total = 2 if what == CAPSULE or is_alone else 2 * RIM if what == CYLINDER else 8
     if what == HULL:
         total = shapes.corners[k, 1]
     best, e, f = -1e300, 1.0, 0.0
     for turn in range(2):  # the farthest first, then what is nearly as far
-        for c in range(2 if turn == 0 and what == CYLINDER and across > FLAT else total):
+        for c in range(2 if turn == 0 and is_steep else total):
             p, q, s = 0.0, 0.0, 0.0
             if what == HULL:
                 v = shapes.vertices[shapes.corners[k, 0] + c]

@@ -207,7 +207,7 @@ class StepArrays(Arrays):
     turned: Floats  # (36,)
     log: Matrix  # (room, MET) contacts at instants reported
     felt: Matrix  # (3 c, 3 c) how contacts feel each other with what joints answer, once needed
-    answer: Matrix  # (k, 3 c) that
+    answer: Matrix  # (3 c, k) that
     small: Floats  # the matrix of a pass of the problem of contacts alone, and its solution
     small_step: Floats
 
@@ -418,5 +418,5 @@ def grown(s: StepArrays) -> StepArrays:
             new[name] = np.zeros(size + size // 4, dtype=np.int64)
     if s.held_count > len(s.felt) // 3:
         m = 3 * s.held_count
-        new |= {"felt": np.zeros((m, m)), "answer": np.zeros((len(s.y), m))}
+        new |= {"felt": np.zeros((m, m)), "answer": np.zeros((m, len(s.y)))}
     return attrs.evolve(s, **new)

@@ -138,8 +138,9 @@ def put_velocities(s: StepArrays, v: Floats) -> None:
 def clear(s: StepArrays, out: Floats) -> None:
     """Put zero for the bodies of a group."""
     for q in range(s.used_count):
+        row = out[s.used[q]]
         for k in range(6):
-            out[s.used[q], k] = 0.0
+            row[k] = 0.0
 
 
 @compiled

@@ -59,7 +59,7 @@ def put_felt(s: StepArrays, passes: int) -> None:
         for r in range(3):
             column = 3 * p + r
             for n in range(s.row_count):
-                s.lead[s.rows[n]] = s.answer[s.rows[n], column] = 0.0
+                s.lead[s.rows[n]] = s.answer[column, s.rows[n]] = 0.0
             for k in range(3 * m):
                 s.felt[column, k] = s.felt[k, column] = 0.0
             if is_idle(s, c, r):
@@ -78,7 +78,7 @@ def put_felt(s: StepArrays, passes: int) -> None:
                     s.pull[k] = newton.speed_of(s, k, s.delta)
                     s.lead[k] -= STIFF * s.s[k] * s.pull[k]
             for n in range(s.row_count):
-                s.answer[s.rows[n], column] = s.lead[s.rows[n]]
+                s.answer[column, s.rows[n]] = s.lead[s.rows[n]]
             for q in range(p + 1):
                 for i in range(3 if q < p else r + 1):
                     if not is_idle(s, s.chosen[q], i):
@@ -99,7 +99,7 @@ def put_mutual(s: StepArrays, q: int, i: int, column: int) -> None:
     for k in range(6):
         felt += J[12 * i + k] * first[k] + J[12 * i + 6 + k] * second[k]
     for n in range(s.row_count):
-        felt += s.answer[s.rows[n], row] * s.pull[s.rows[n]]
+        felt += s.answer[row, s.rows[n]] * s.pull[s.rows[n]]
     s.felt[row, column] = s.felt[column, row] = felt
 
 
@@ -151,16 +151,14 @@ def reduced_round(s: StepArrays, weight: float, tolerance: float) -> float:
     while not solve_reduced(s, weight, tolerance) and weight >= LEAST:
         weight *= LESS
     for n in range(s.row_count):
-        k = s.rows[n]
-        s.pull[k] = s.y[k]
-        for q in range(m):
-            for r in range(3):
-                s.y[k] += s.answer[k, 3 * q + r] * s.push[s.chosen[q], r]
+        s.pull[s.rows[n]] = s.y[s.rows[n]]
     for q in range(m):
         c = s.chosen[q]
-        for k in range(3):
-            old = s.x[c, k]
-            s.x[c, k], s.push[c, k] = old + s.push[c, k], old
+        for r in range(3):
+            y, answer, old, push = s.y, s.answer[3 * q + r], s.x[c, r], s.push[c, r]
+            for n in range(s.row_count):
+                y[s.rows[n]] += answer[s.rows[n]] * push
+            s.x[c, r], s.push[c, r] = old + push, old
     meet_joints(s)
     return weight
 
