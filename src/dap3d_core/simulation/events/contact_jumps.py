@@ -194,7 +194,8 @@ class ContactJumps(Jumps):
         """
         steps, t = integration.statistics.steps, integration.t
         (before, since), span = self._stood, self._span_of(integration)
-        is_slow, is_at_floor = (integration.status is s for s in (Status.STIFF, Status.STEP_FLOOR))
+        is_slow = integration.status is Status.STIFF
+        is_at_floor = integration.status in (Status.STEP_FLOOR, Status.NOT_FINITE)
         stalls = integration.status is Status.STALLED and not integration.implicit
         is_stalled = is_slow or is_at_floor or stalls
         if not is_stalled and (t - since > SLOW * span or steps < before):
