@@ -193,3 +193,4 @@ def test_of_three_sliding_feet_one_leaves_where_their_forces_are_no_longer_decid
     N = np.array([result.contact(f"c{k}").normal_force for k in range(3)])
     assert np.all((N[:, result.t > leaves[0]] > 0.0).sum(axis=0) == 2)
     assert np.max(np.diff(result.energy.total)) <= 1e-12
+    assert any("several motions" in note for note in result.notes)

@@ -105,6 +105,8 @@ class ContactJumps(Jumps):
         self._gain: tuple[float, float, str] = (0.0, 0.0, "")
         #: Names of contacts that shared what they carry, slid, and moved as they shared it.
         self._sharing: set[str] = set()
+        #: Names of contacts that left where several motions go on, and the instants, s.
+        self._left: dict[str, float] = {}
 
     @cached_property
     def arrays(self) -> ContactArrays:
@@ -277,6 +279,11 @@ class ContactJumps(Jumps):
                 "Newton's law does so beside friction and beside other laws or e; "
                 'law = "poisson" of all that strikes at once does not'
             )
+        for name, t in list(self._left.items())[:1]:
+            found.append(
+                f"forces of contacts that slide were no longer decided at t = {t:.9g} s, where "
+                f"several motions go on by Coulomb's law: {name} left; feet on springs decide that"
+            )
         if self._sharing:
             found.append(
                 f"contacts {some(sorted(self._sharing))} share what they carry, which bodies leave "
@@ -369,6 +376,8 @@ class ContactJumps(Jumps):
             return
         if failure := decide(*given, evaluator.functions, table.tensions):
             self._refuse(t, failure)
+        if s.jammed >= 0 and s.mode[s.jammed] == 0.0:
+            self._left.setdefault(table.names[s.jammed], t)
         s.jammed = -1
         work, struck = float(np.sum(s.work)), np.flatnonzero(np.abs(s.impulses[:, 0]) > 0.0)
         self.lose |= abs(work) > LOSSLESS * s.exchanged
