@@ -33,8 +33,9 @@ from dap3d_core.linear.least_squares import factor_least, put_null, solve_least
 #: leaves shows which of them do, and where to.
 LOOSE = 1.0 - 1e-6
 #: Part of its mobility that friction leaves a contact whose steps become endless: it jams; and
-#: where time resolves them no more.
-NEARLY, AT_FLOOR = 1e-2, 1e-1
+#: where time resolves them no more. The same of what several that slide do to each other: radau
+#: comes as near as 1e-6 to where it leaves nothing, dop853 as 1e-13.
+NEARLY, AT_FLOOR, COUPLED = 1e-2, 1e-1, 1e-3
 #: Part of the largest acceleration by which such a contact may approach where it leaves: steps have
 #: become short just before that is over.
 NEARLY_ZERO = 1e-5
@@ -483,7 +484,7 @@ def nearly_jams(s: ContactArrays, part: float) -> int:
 
     Of those that touch, alone or by what they do to each other, A x = W 1 with large x: its normal
     force grows beyond all bounds there, in a finite time, or there are several motions from there.
-    part: of its mobility, which is next to nothing.
+    part: of its mobility, which is next to nothing where it is alone.
     """
     s.closed_count = 0
     for k in range(s.touching_count):
@@ -509,7 +510,7 @@ def nearly_jams(s: ContactArrays, part: float) -> int:
             s.B[k, q] = s.cone.A[3 * k, 3 * q]
     rank = factor_least(s.B, n, n, 0.0, 0.0, s.w, s.order)
     solve_least(s.B, n, n, rank, s.w, s.order, s.x, s.right)
-    most, found = 1.0 / part, -1
+    most, found = 1.0 / COUPLED, -1
     for k in range(n):
         if abs(s.right[k]) > most:
             most, found = abs(s.right[k]), s.closed[k]
