@@ -258,7 +258,7 @@ def add_columns(t: float, system: System, loops: Any) -> int:
 
 @compiled
 def invert_responses(system: System, count: int) -> None:
-    """(I - L)^-1 behind the columns, where no load of a joint presses; NaN unless it has det > 0."""
+    """(I - L)^-1 behind the columns, where no load of a joint presses; NaN unless det > 0."""
     if has_loads(system, count):
         return
     A, size = inverse(system, count), system.acceleration.shape[0]
