@@ -27,17 +27,13 @@ from dap3d_core.formulations.contacts.sharing import (
 )
 from dap3d_core.kernels.array_types import Integers
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.linear.least_squares import factor_least, put_null, solve_least
+from dap3d_core.linear.least_squares import factor_least, put_null
 
 #: Part of its cone in which friction of contacts that share stays where they begin to slip: what it
 #: leaves shows which of them do, and where to.
 LOOSE = 1.0 - 1e-6
-#: Part of its mobility that friction leaves a contact whose steps become endless: it jams; and
-#: where time resolves them no more. The same of what several that slide do to each other: radau
-#: comes as near as 1e-6 to where it leaves nothing, dop853 as 1e-13.
-NEARLY, AT_FLOOR, COUPLED = 1e-2, 1e-1, 1e-3
-#: Part of the largest acceleration by which such a contact may approach where it leaves: steps have
-#: become short just before that is over.
+#: Part of the largest acceleration by which a contact that jams may approach where it leaves: steps
+#: have become short just before that is over.
 NEARLY_ZERO = 1e-5
 #: Part of the largest force that is to be left for a contact that stays as others can carry less;
 #: and for one that is at the end of its cone: with less it would be there again at once.
@@ -476,42 +472,3 @@ def put_one(s: ContactArrays, k: int, shares: bool, is_one: bool, least: float) 
             s.way[c, i] += s.speed[c] / s.arm[c] * way[q] * s.frames[c, q, i]
             if near and (sticks or (q == 0 and normal)):
                 s.near[c, i] += s.arm[c] * force[q] * s.frames[c, q, i]
-
-
-@compiled
-def nearly_jams(s: ContactArrays, part: float) -> int:
-    """A contact whose friction leaves next to nothing of how it gives way; -1 of none.
-
-    Of those that touch, alone or by what they do to each other, A x = W 1 with large x: its normal
-    force grows beyond all bounds there, in a finite time, or there are several motions from there.
-    part: of its mobility, which is next to nothing where it is alone.
-    """
-    s.closed_count = 0
-    for k in range(s.touching_count):
-        c = s.touching[k]
-        if s.alone[c] == 0:
-            s.closed[s.closed_count] = c
-            s.closed_count += 1
-    put_matrix(s, False)
-    n = s.closed_count
-    for k in range(n):
-        c = s.closed[k]
-        if s.slides[c] != 0 and s.cone.A[3 * k, 3 * k] < part * s.W[3 * c, 3 * c]:
-            return c
-    for k in range(n):
-        s.x[k] = 0.0
-        for q in range(n):
-            s.B[k, q] = s.W[3 * s.closed[k], 3 * s.closed[q]]
-            s.x[k] += s.B[k, q]
-    if factor_least(s.B, n, n, DEPENDENT, 0.0, s.w, s.order) < n:  # they share what they carry
-        return -1
-    for k in range(n):
-        for q in range(n):
-            s.B[k, q] = s.cone.A[3 * k, 3 * q]
-    rank = factor_least(s.B, n, n, 0.0, 0.0, s.w, s.order)
-    solve_least(s.B, n, n, rank, s.w, s.order, s.x, s.right)
-    most, found = 1.0 / COUPLED, -1
-    for k in range(n):
-        if abs(s.right[k]) > most:
-            most, found = abs(s.right[k]), s.closed[k]
-    return found

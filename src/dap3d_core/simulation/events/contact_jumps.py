@@ -25,8 +25,7 @@ from dap3d_core.formulations.contacts.decide import (
     repeat,
 )
 from dap3d_core.formulations.contacts.forces import still_speed
-from dap3d_core.formulations.contacts.impacts import ROUNDS, TOUCHING
-from dap3d_core.formulations.contacts.modes import AT_FLOOR, NEARLY, nearly_jams
+from dap3d_core.formulations.contacts.impacts import AT_FLOOR, NEARLY, ROUNDS, TOUCHING, nearly_jams
 from dap3d_core.formulations.contacts.rows import follow_joints, keep_velocities, meet, put_rows
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators import Integration, Status
@@ -105,7 +104,7 @@ class ContactJumps(Jumps):
         self._gain: tuple[float, float, str] = (0.0, 0.0, "")
         #: Names of contacts that shared what they carry, slid, and moved as they shared it.
         self._sharing: set[str] = set()
-        #: Names of contacts that left where several motions go on, and the instants, s.
+        #: Contacts that left where several motions go on, and instants, s.
         self._left: dict[str, float] = {}
 
     @cached_property
@@ -279,7 +278,7 @@ class ContactJumps(Jumps):
                 "Newton's law does so beside friction and beside other laws or e; "
                 'law = "poisson" of all that strikes at once does not'
             )
-        for name, t in list(self._left.items())[:1]:
+        for name, t in [*self._left.items()][:1]:
             found.append(
                 f"forces of contacts that slide were no longer decided at t = {t:.9g} s, where "
                 f"several motions go on by Coulomb's law: {name} left; feet on springs decide that"
