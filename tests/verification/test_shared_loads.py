@@ -137,3 +137,60 @@ def test_a_motion_that_depends_on_the_share_is_noted(spin, told):
     run.step(0.01)
     for result in (dap.simulate(scene, t_end=0.01, dt=0.01), run.result()):
         assert any("share what they carry" in note for note in result.notes) == told
+
+
+def sliding_feet(q, v, feet, mu, height):
+    """Equations of a body that slides on three feet: heave and moments by their normal forces.
+
+    Returns (3, 3) of the equations, places of the feet and friction (3, 2) by normal forces of one.
+    """
+    c, s = np.cos(q[2]), np.sin(q[2])
+    r = feet @ np.array([[c, s], [-s, c]])
+    slip = v[:2] + v[2] * np.stack([-r[:, 1], r[:, 0]], axis=1)
+    force = -np.reshape(mu, (3, 1)) * slip / np.linalg.norm(slip, axis=1)[:, None]
+    A = np.array([np.ones(3), r[:, 1] + height * force[:, 1], -r[:, 0] - height * force[:, 0]])
+    return A, r, force
+
+
+@pytest.mark.parametrize("integrator", ["dop853", pytest.param("radau", marks=pytest.mark.slow)])
+def test_of_three_sliding_feet_one_leaves_where_their_forces_are_no_longer_decided(integrator):
+    """Painleve, of several contacts: what friction of one foot does to the others cancels W.
+
+    The determinant of the equations of normal forces goes through zero while these are finite. All
+    three feet would go on by them, but none of a stiffness stays there; with two there is a motion.
+    """
+    feet, mu = np.array([[0.112, 0.002], [-0.006, 0.253], [-0.043, -0.273]]), [1.0, 1.0, 0.0]
+    mass, J, height = 0.46, 0.03, 0.15
+    start = [0.0, 0.0, 0.16752, 0.1092, -0.18934, 0.6368]
+
+    def rates(t, y):
+        A, r, force = sliding_feet(y[:3], y[3:], feet, mu, height)
+        f = force * np.linalg.solve(A, [mass * G, 0.0, 0.0])[:, None]
+        moment = np.sum(r[:, 0] * f[:, 1] - r[:, 1] * f[:, 0])
+        return [*y[3:], *f.sum(axis=0) / mass, moment / J]
+
+    def determinant(t, y):
+        return np.linalg.det(sliding_feet(y[:3], y[3:], feet, mu, height)[0])
+
+    determinant.terminal = True
+    reference = solve_ivp(rates, [0.0, 0.02], start, "DOP853", rtol=1e-11, atol=1e-13,
+                          events=determinant)  # fmt: skip
+    scene = dap.Scene(name="three feet")
+    scene.add_force("weight", "g")
+    half = start[2] / 2.0
+    scene.add_body("b", mass=mass, Jp=[0.02, 0.025, J], r=[0.0, 0.0, height],
+                   p=[np.cos(half), 0.0, 0.0, np.sin(half)], r_dot=[*start[3:5], 0.0],
+                   w=[0.0, 0.0, start[5]])  # fmt: skip
+    for k, (x, y) in enumerate(feet):
+        scene.add_point(f"f{k}", "b", [x, y, -height])
+        scene.add_contact("ball_plane", f"c{k}", P_i=f"f{k}", mu=mu[k])
+    result = dap.simulate(scene, t_end=0.015, dt=1e-4, integrator=integrator, rtol=1e-10,
+                          atol=1e-12)  # fmt: skip
+    leaves = [event.t for event in result.events if event.kind == "lift"]
+    assert reference.t_events[0].size == 1
+    # forces go like the logarithm of the time left, and steps end some 1e-8 s before
+    assert leaves[0] == pytest.approx(reference.t_events[0][0], abs=1e-7)
+    N = np.array([result.contact(f"c{k}").normal_force for k in range(3)])
+    assert np.all((N[:, result.t > leaves[0]] > 0.0).sum(axis=0) == 2)
+    assert np.max(np.diff(result.energy.total)) <= 1e-12
+    assert any("several motions" in note for note in result.notes)

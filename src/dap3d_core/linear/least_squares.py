@@ -152,12 +152,12 @@ def unfold(A: Floats, n: int, rank: int, w: Floats, order: Integers, x: Floats) 
 
 
 @compiled
-def invert(A: Floats, count: int) -> None:
+def invert(A: Floats, count: int) -> float:
     """The inverse of a matrix, behind it in each row of A (count, 2 count), takes its place.
 
-    Not numbers where it has none.
+    Not numbers where it has none. Returns the determinant.
     """
-    n = 2 * count
+    n, determinant = 2 * count, 1.0
     for k in range(count):
         best = k
         for r in range(k + 1, count):
@@ -165,9 +165,11 @@ def invert(A: Floats, count: int) -> None:
         for q in range(k, n):
             A[k * n + q], A[best * n + q] = A[best * n + q], A[k * n + q]
         pivot = A[k * n + k]
+        determinant *= pivot if best == k else -pivot
         for q in range(k, n):
             A[k * n + q] /= pivot
         for r in range(count):
             w = A[r * n + k]
             for q in range(k, n):
                 A[r * n + q] -= w * A[k * n + q] if r != k else 0.0
+    return determinant

@@ -103,9 +103,13 @@ def decide(
         stop_what_rests(s, system)
     move_on(t, s, system, loops, tensions)
     if s.jammed >= 0:
+        s.leaves[s.jammed] = 1  # where others carry what it did
+    lasts = find_lasting(t, s, system, loops, functions, tensions)
+    if s.jammed >= 0 and not (lasts and s.mode[s.jammed] == 0.0):
+        lasts = False
         for c in range(s.jams.shape[0]):
             s.jams[c] = c == s.jammed
-    if s.jammed >= 0 or not find_lasting(t, s, system, loops, functions, tensions):
+    if not lasts:
         if not unjam(s, system):
             return blame(s)
         s.freed += 1

@@ -199,8 +199,7 @@ def largest_given(system: System) -> float:
         if is_given(system, c):
             near = system.contacts[c, STATE] + NEAR
             for k in range(near, near + 3):
-                size = abs(states[k])
-                found = where(size > found, size, found)
+                found = where(abs(states[k]) > found, abs(states[k]), found)
     return found
 
 
@@ -259,7 +258,7 @@ def add_columns(t: float, system: System, loops: Any) -> int:
 
 @compiled
 def invert_responses(system: System, count: int) -> None:
-    """(I - L)^-1 behind the columns, where no load of a joint is among what presses."""
+    """(I - L)^-1 behind the columns, where no load of a joint presses; NaN unless det > 0."""
     if has_loads(system, count):
         return
     A, size = inverse(system, count), system.acceleration.shape[0]
@@ -268,7 +267,8 @@ def invert_responses(system: System, count: int) -> None:
         for s in range(count):
             A[2 * count * r + s] = column(system, s)[size + place] + (1.0 if r == s else 0.0)
             A[2 * count * r + count + s] = 1.0 if r == s else 0.0
-    invert(A, count)
+    if count > 0 and not invert(A, count) > 0.0:
+        A[count] = np.inf - np.inf
 
 
 @compiled_into

@@ -14,7 +14,7 @@ from dap3d_core.assembly.arrays import System
 from dap3d_core.assembly.evaluate import copy, zero
 from dap3d_core.formulations.contacts.cone import solve_cone
 from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
-from dap3d_core.formulations.contacts.forces import UNSOLVED, put_plain
+from dap3d_core.formulations.contacts.forces import UNSOLVED, put_matrix, put_plain
 from dap3d_core.formulations.contacts.rows import change, kick, lift
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
@@ -30,6 +30,10 @@ CANCELLED = 1e-15
 FARTHER = 1e3
 #: Rounds of one instant; in the last one all that touches stops.
 ROUNDS = 500
+#: Part of its mobility that friction leaves a contact whose steps become endless: it jams; and
+#: where time resolves them no more. The same of what several that slide do to each other: radau
+#: comes as near as 1e-6 to where it leaves nothing, dop853 as 1e-13.
+NEARLY, AT_FLOOR, COUPLED = 1e-2, 1e-1, 1e-3
 #: Height of a bounce, as a part of the length of the scene, from which on what bounces is held:
 #: those that follow end after the geometric series of their times, too near to tell from rest. The
 #: nearer e is to 1 the more bounces that takes: LAST_LOSS over 1 - e, up to a height that touches.
@@ -320,3 +324,42 @@ def repeat_rounds(s: ContactArrays, system: System) -> None:
         elif stop_slip(s):
             act(s, system)
     hold_low(s, system)
+
+
+@compiled
+def nearly_jams(s: ContactArrays, part: float) -> int:
+    """A contact whose friction leaves next to nothing of how it gives way; -1 of none.
+
+    Of those that touch, alone or by what they do to each other, A x = W 1 with large x: its normal
+    force grows beyond all bounds there, in a finite time, or there are several motions from there.
+    part: of its mobility, which is next to nothing where it is alone.
+    """
+    s.closed_count = 0
+    for k in range(s.touching_count):
+        c = s.touching[k]
+        if s.alone[c] == 0:
+            s.closed[s.closed_count] = c
+            s.closed_count += 1
+    put_matrix(s, False)
+    n = s.closed_count
+    for k in range(n):
+        c = s.closed[k]
+        if s.slides[c] != 0 and s.cone.A[3 * k, 3 * k] < part * s.W[3 * c, 3 * c]:
+            return c
+    for k in range(n):
+        s.x[k] = 0.0
+        for q in range(n):
+            s.B[k, q] = s.W[3 * s.closed[k], 3 * s.closed[q]]
+            s.x[k] += s.B[k, q]
+    if factor_least(s.B, n, n, DEPENDENT, 0.0, s.w, s.order) < n:  # they share what they carry
+        return -1
+    for k in range(n):
+        for q in range(n):
+            s.B[k, q] = s.cone.A[3 * k, 3 * q]
+    rank = factor_least(s.B, n, n, 0.0, 0.0, s.w, s.order)
+    solve_least(s.B, n, n, rank, s.w, s.order, s.x, s.right)
+    most, found = 1.0 / COUPLED, -1
+    for k in range(n):
+        if abs(s.right[k]) > most:
+            most, found = abs(s.right[k]), s.closed[k]
+    return found

@@ -32,9 +32,9 @@ from dap3d_core.linear.least_squares import factor_least, put_null
 #: Part of its cone in which friction of contacts that share stays where they begin to slip: what it
 #: leaves shows which of them do, and where to.
 LOOSE = 1.0 - 1e-6
-#: Part of its mobility that friction leaves a contact whose steps become endless: it jams; and
-#: where time resolves them no more.
-NEARLY, AT_FLOOR = 1e-2, 1e-1
+#: Part of the largest acceleration by which a contact that jams may approach where it leaves: steps
+#: have become short just before that is over.
+NEARLY_ZERO = 1e-5
 #: Part of the largest force that is to be left for a contact that stays as others can carry less;
 #: and for one that is at the end of its cone: with less it would be there again at once.
 TO_STAY, TO_STICK = 1e-6, 1e-3
@@ -122,7 +122,7 @@ def put_modes(s: ContactArrays) -> bool:
         # of contacts that share, one at the end of its cone may only have to carry less
         if not put_matrix(s, False):
             return False
-        if do_share(s) and hold_inside(s, False) and all_stay(s):
+        if s.jammed < 0 and do_share(s) and hold_inside(s, False) and all_stay(s):
             leave_few(s)
             return put_found(s, False, True, False)
         put_plain(s)
@@ -306,7 +306,7 @@ def let_leave(s: ContactArrays, count: int) -> None:
 
     What carries nothing leaves with them: it would be the next to.
     """
-    big = 1e-300
+    big, least = 1e-300, ZERO if s.jammed < 0 else NEARLY_ZERO
     for k in range(s.closed_count):
         c = s.closed[k]
         s.gone[c], s.slipping[c] = 0, 0
@@ -330,7 +330,7 @@ def let_leave(s: ContactArrays, count: int) -> None:
         zero(s.cone.x[: 3 * s.closed_count])
         holds = put_matrix(s, True) and solve_without(s)
         without = s.closed_count
-        if not holds or put_returning(s, -ZERO * big) > 0:
+        if not holds or put_returning(s, -least * big) > 0:
             if not holds or without > 0:
                 for k in range(before):
                     s.closed[k] = s.before[k]
@@ -472,24 +472,3 @@ def put_one(s: ContactArrays, k: int, shares: bool, is_one: bool, least: float) 
             s.way[c, i] += s.speed[c] / s.arm[c] * way[q] * s.frames[c, q, i]
             if near and (sticks or (q == 0 and normal)):
                 s.near[c, i] += s.arm[c] * force[q] * s.frames[c, q, i]
-
-
-@compiled
-def nearly_jams(s: ContactArrays, part: float) -> int:
-    """A contact whose friction leaves next to nothing of how it gives way; -1 of none.
-
-    Of those that touch: its normal force grows beyond all bounds there, in a finite time.
-    part: of its mobility, which is next to nothing.
-    """
-    s.closed_count = 0
-    for k in range(s.touching_count):
-        c = s.touching[k]
-        if s.alone[c] == 0:
-            s.closed[s.closed_count] = c
-            s.closed_count += 1
-    put_matrix(s, False)
-    for k in range(s.closed_count):
-        c = s.closed[k]
-        if s.slides[c] != 0 and s.cone.A[3 * k, 3 * k] < part * s.W[3 * c, 3 * c]:
-            return c
-    return -1

@@ -25,8 +25,7 @@ from dap3d_core.formulations.contacts.decide import (
     repeat,
 )
 from dap3d_core.formulations.contacts.forces import still_speed
-from dap3d_core.formulations.contacts.impacts import ROUNDS, TOUCHING
-from dap3d_core.formulations.contacts.modes import AT_FLOOR, NEARLY, nearly_jams
+from dap3d_core.formulations.contacts.impacts import AT_FLOOR, NEARLY, ROUNDS, TOUCHING, nearly_jams
 from dap3d_core.formulations.contacts.rows import follow_joints, keep_velocities, meet, put_rows
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators import Integration, Status
@@ -105,6 +104,8 @@ class ContactJumps(Jumps):
         self._gain: tuple[float, float, str] = (0.0, 0.0, "")
         #: Names of contacts that shared what they carry, slid, and moved as they shared it.
         self._sharing: set[str] = set()
+        #: Contacts that left where several motions go on, and instants, s.
+        self._left: dict[str, float] = {}
 
     @cached_property
     def arrays(self) -> ContactArrays:
@@ -194,7 +195,8 @@ class ContactJumps(Jumps):
         """
         steps, t = integration.statistics.steps, integration.t
         (before, since), span = self._stood, self._span_of(integration)
-        is_slow, is_at_floor = (integration.status is s for s in (Status.STIFF, Status.STEP_FLOOR))
+        is_slow = integration.status is Status.STIFF
+        is_at_floor = integration.status in (Status.STEP_FLOOR, Status.NOT_FINITE)
         stalls = integration.status is Status.STALLED and not integration.implicit
         is_stalled = is_slow or is_at_floor or stalls
         if not is_stalled and (t - since > SLOW * span or steps < before):
@@ -275,6 +277,11 @@ class ContactJumps(Jumps):
                 f"an impact at t = {t:.9g} s gave {gain:.3g} J, the most of this run ({names}): "
                 "Newton's law does so beside friction and beside other laws or e; "
                 'law = "poisson" of all that strikes at once does not'
+            )
+        for name, t in [*self._left.items()][:1]:
+            found.append(
+                f"forces of contacts that slide were no longer decided at t = {t:.9g} s, where "
+                f"several motions go on by Coulomb's law: {name} left; feet on springs decide that"
             )
         if self._sharing:
             found.append(
@@ -368,6 +375,8 @@ class ContactJumps(Jumps):
             return
         if failure := decide(*given, evaluator.functions, table.tensions):
             self._refuse(t, failure)
+        if s.jammed >= 0 and s.mode[s.jammed] == 0.0:
+            self._left.setdefault(table.names[s.jammed], t)
         s.jammed = -1
         work, struck = float(np.sum(s.work)), np.flatnonzero(np.abs(s.impulses[:, 0]) > 0.0)
         self.lose |= abs(work) > LOSSLESS * s.exchanged
