@@ -41,7 +41,7 @@ def motion(start, times, hook=(0.0, 0.0), pull=0.0):
         force = load[:, None] * friction
         turn = np.sum(x[:, 0] * force[:, 1] - x[:, 1] * force[:, 0])
         turn -= (np.array(hook) @ turned)[1] * pull * t
-        return [*y[3:], *(force.sum(axis=0) + [pull * t, 0.0]), turn / J3]
+        return [*y[3:], *(force.sum(axis=0) + np.array([pull * t, 0.0])), turn / J3]
 
     end = solve_ivp(rates, times, start, "Radau" if pull else "RK45", rtol=1e-12, atol=1e-13)
     return end.y[[0, 1, 3, 4, 5], -1]
