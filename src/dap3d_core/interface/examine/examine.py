@@ -58,7 +58,6 @@ from dap3d_core.interface.examine.random_values import (
 )
 from dap3d_core.interface.fields import SLOTS, sized_fields, slot_of, specs_of
 from dap3d_core.interface.types import SYMBOLS, Force, Function, Joint, TypeBase
-from dap3d_core.kernels import __all__ as kernel_words
 
 #: Random inputs a type may refuse, or be undefined for, before it counts as broken.
 ATTEMPTS = 200
@@ -176,8 +175,11 @@ def _output(
             if isinstance(error, ArithmeticError) and attempt < ATTEMPTS - 1:
                 continue
             reason = f"{type(error).__name__}: {error}{line_of(error, kernel)}"
-            if isinstance(error, NameError) and error.name in kernel_words:
-                reason += f"; from dap3d_core.kernels import {error.name}"
+            if isinstance(error, NameError):
+                from dap3d_core.kernels import __all__ as kernel_words
+
+                if error.name in kernel_words:
+                    reason += f"; from dap3d_core.kernels import {error.name}"
             raise PluginError(f"{who} failed on a random input: {reason}") from error
         scalars = [value_at(value, path) for path in paths]
         wrong = [x for x in scalars if isinstance(x, bool) or not isinstance(x, (int, float))]

@@ -275,6 +275,8 @@ def _unknown(result: QuantitySource, name: str) -> UnknownNameError:
 
 def _is_expression(result: QuantitySource, text: str) -> bool:
     """True of text that computes something from quantities that there are."""
+    if text.replace(".", "_").isidentifier():
+        return False
     from dap3d_core.scene.expressions.expression import Call, ExpressionError, parse_expression
 
     try:

@@ -35,8 +35,8 @@ def test_no_run_changes_a_constant(model, method):
     evaluator.start(0.0, evaluator.model.u0)
     parts = scene_program.constant_parts(evaluator)
     before = scene_program.constant_numbers(parts)
-    options = {"report_size": evaluator.report_size, "length_count": evaluator.length_count}
-    integration = EXPLICIT.make(evaluator, y0, np.array([0.0, 0.02]), project_on=True, **options)
+    options = {"report_size": evaluator.report_size, "project_on": True}
+    integration = EXPLICIT.make(evaluator, y0, np.array([0.0, 0.02]), **options)
     integration.advance(10**6)
     assert integration.statistics.projections > 0
     assert scene_program.constant_numbers(parts) == before

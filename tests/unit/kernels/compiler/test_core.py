@@ -117,7 +117,7 @@ NOT_CALLED = {
         "integrators.stepping.switch_values": "first_across has_jumped correct_rates",
         "linear.rank": "solve_each",
         "linear.ldlt.factor": "weigh_alike square_of_corner",  # of contacts
-        "study.batch.initial_state": "keep put_back",  # of differentiated code
+        "study.batch.initial_state": "put_back",  # of differentiated code
         # of jumps with closed forms: unit/formulations/jumps, unit/simulation/events
         "formulations.jumps.multipliers": "rotate seek_active",
         "formulations.jumps.rounds": "kick has_crossed stop",

@@ -170,7 +170,7 @@ def test_turns_of_an_angle_are_counted(scene, motion):
         ({}, [], "name the actuators"),
         ({"rod.w.y": 0.0}, "motor", "positions do not change this quantity"),
         ({"rood.r.x": 0.0}, "motor", "did you mean 'rod.r.x'"),
-        ({"rod.r": 0.0}, "motor", "components: x, y, z"),
+        ({"rod.r": 0.0}, "motor", "one of its components: rod.r.x, rod.r.y, rod.r.z"),
         ({"t": 1.0}, "motor", "times must increase"),
     ],
 )
