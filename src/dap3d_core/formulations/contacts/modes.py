@@ -180,8 +180,7 @@ def slip_sharing(s: ContactArrays, begins: bool, part: float) -> bool:
     let_open(s)
     lasts = 0 < s.closed_count < before and put_matrix(s, begins) and begin_near(s, part)
     if lasts and put_returning(s, -ZERO * put_sizes(s, True)) == 0:
-        slip_alike(s, begins, part)
-        return True
+        return slip_alike(s, begins, part) or begin_to_move(s, part, False)
     close_active(s, before, begins)
     return begin_near(s, part) or begin_to_move(s, part, True)
 
@@ -198,7 +197,7 @@ def slip_alike(s: ContactArrays, begins: bool, part: float) -> bool:
     """Let what was found to slip do so as on feet of one stiffness, if these press all of it.
 
     Normal forces have nothing along what no motion of bodies gives then, as rows ask for. False if
-    they do not press, or nothing shares.
+    they do not press, or nothing shares; forces are as before then, and no accelerations known.
     begins, part: as of ``put_found``.
     """
     count, n = 0, 3 * s.closed_count
@@ -225,7 +224,8 @@ def slip_alike(s: ContactArrays, begins: bool, part: float) -> bool:
     put_matrix(s, begins)
     if not is_found:
         copy(s.cone.x[:n], s.inner)
-        begin_to_move(s, part, False)
+        for k in range(s.closed_count):
+            s.jams[s.closed[k]] = 0
     return is_found
 
 
