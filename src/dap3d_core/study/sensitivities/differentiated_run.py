@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
 #: Part of a run by which a state lies before the jump of a switch.
 BEFORE_JUMP = 1e-12
-#: Part of the time after which shares end sooner than can be told; change of a state, over its
-#: largest number, that is none of its motion.
-SOON, NO_JUMP = 1e-7, 1e-10
+#: Part of the time after which shares end that differences may pass, and sooner than can be told;
+#: change of a state, over its largest number, that is none of its motion.
+SOON, AT_ONCE, NO_JUMP = 1e-7, 1e-10, 1e-10
 #: Derivative of a slip, over the largest one of the state, that is rounding.
 NO_SLIP = 1e-9
 #: At the end of a slip: most that a step is of the time left; part of the way at which the last one
@@ -191,11 +191,14 @@ class DifferentiatedRun(Run):
             others: dict[Run, Jumps] = {}
             change(of, integration)
             motion = slice(0, -2)  # without the work done and time
-            if self._shares_again(of, crossed, given):
+            slopes, is_soon = np.full(1, np.nan), self._shares_again(of, crossed, given)
+            if not is_soon or given[-1] - self._latest[0] > AT_ONCE * given[-1]:
+                slopes = self._derivative(after, given, np.vstack([of_state, of_time]), motion)
+            if is_soon and np.isnan(slopes).any():
                 later = self._latest[1] - of_time
                 of_state = of_state + np.outer(self._rates_before(self.base, put, given), later)
                 of_time = of_time + later
-            slopes = self._derivative(after, given, np.vstack([of_state, of_time]), motion)
+                slopes = self._derivative(after, given, np.vstack([of_state, of_time]), motion)
             if np.isnan(slopes).any():
                 what = f"there is no derivative of what happens at t = {work.t:.9g} s"
                 raise SimulationError(f"{what}: {failures[-1]}") from failures[-1]
