@@ -139,6 +139,18 @@ def test_what_stands_on_a_face_has_all_its_corners(kinds, sizes, points):
     assert found.point[:, :2].mean(axis=0) == pytest.approx([0.1, 0.0], abs=1e-14)
 
 
+@pytest.mark.parametrize("tilt", [1e-3, 1e-2, 3e-2, 0.1])
+def test_of_a_rim_that_tilts_those_points_are_found_that_may_touch(tilt):
+    """Eight, five, three, one: at 0.2 (1 - cos) sin tilt above the lowest, within both margins."""
+    pair, margin = finder([CYLINDER, PLANE], [[0.2, 0.3, 0.0], [0.0, 0.0, 0.0]]), 1e-3
+    r = np.array([[0.0, 0.0, 0.3 * np.cos(tilt) + 0.2 * np.sin(tilt)], [0.0, 0.0, 0.0]])
+    turned = [np.cos(tilt / 2.0), 0.0, np.sin(tilt / 2.0), 0.0]
+    found = pair.find(r, np.array([turned, [1.0, 0.0, 0.0, 0.0]]), np.full(3, margin))
+    gaps = 0.2 * (1.0 - np.cos(np.pi / 4.0 * np.arange(8))) * np.sin(tilt)
+    expected = np.sort(gaps[gaps < 2.0 * margin])
+    assert np.sort(found.gap) == pytest.approx(expected, abs=1e-15)
+
+
 def prism(corners):
     """Vertices of a prism along z, in the unit circle."""
     angles = 2.0 * np.pi * np.arange(corners) / corners
