@@ -19,15 +19,15 @@ from dap3d_core.formulations.contacts.forces import (
     still_speed,
 )
 from dap3d_core.formulations.contacts.sharing import (
-    DEPENDENT,
     WELL,
     are_inside,
     do_share,
+    factor_rows,
     leave_to_others,
 )
 from dap3d_core.kernels.array_types import Integers
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.linear.least_squares import factor_least, put_null
+from dap3d_core.linear.least_squares import put_null
 
 #: Part of its cone in which friction of contacts that share stays where they begin to slip: what it
 #: leaves shows which of them do, and where to.
@@ -200,26 +200,23 @@ def slip_alike(s: ContactArrays, begins: bool, part: float) -> bool:
     they do not press, or nothing shares; forces are as before then, and no accelerations known.
     begins, part: as of ``put_found``.
     """
-    count, n = 0, 3 * s.closed_count
+    count, n, A = 0, 3 * s.closed_count, s.cone.A
     for k in range(s.closed_count):
         c = s.closed[k]
         slips = s.slides[c] != 0 or size_across(s, c, s.rates[3 * k : 3 * k + 3]) > 0.0
         if slips and s.alone[c] == 0:
-            s.rows[count] = 3 * k
+            s.active[count], s.rows[count] = 3 * k, 3 * c
             count += 1
-    for i in range(count):
-        for k in range(count):
-            s.B[i, k] = s.W[3 * s.closed[s.rows[i] // 3], 3 * s.closed[s.rows[k] // 3]]
-    rank = factor_least(s.B, count, count, DEPENDENT, 0.0, s.w, s.order)
+    rank = factor_rows(s, count, True)
     if rank == count:
         return False
     copy(s.inner[:n], s.cone.x)
     for q in range(count - rank):
         put_null(s.B, count, rank, s.w, s.order, q, s.x)
         for i in range(count):
+            size = s.W[s.rows[i], s.rows[i]]
             for k in range(count):
-                size = s.W[3 * s.closed[s.rows[i] // 3], 3 * s.closed[s.rows[i] // 3]]
-                s.cone.A[s.rows[i], s.rows[k]] += size * s.x[i] * s.x[k]
+                A[s.active[i], s.active[k]] += size * s.x[i] * s.x[k]
     is_found = slip_pressed(s, count, 1.0) or slip_pressed(s, count, part)
     put_matrix(s, begins)
     if not is_found:
@@ -231,15 +228,15 @@ def slip_alike(s: ContactArrays, begins: bool, part: float) -> bool:
 
 @compiled
 def slip_pressed(s: ContactArrays, count: int, part: float) -> bool:
-    """True if some of the contacts of the first ``rows`` slip, and all have normal forces."""
+    """True if some of the first contacts that are ``active`` slip, and all have normal forces."""
     zero(s.cone.x[: 3 * s.closed_count])
     for i in range(count):
-        s.slipping[s.closed[s.rows[i] // 3]] = 1
+        s.slipping[s.closed[s.active[i] // 3]] = 1
     if not solve_to_move(s, part):
         return False
     size, presses, slips = largest(s.cone.x[: 3 * s.closed_count]), True, False
     for i in range(count):
-        k = s.rows[i]
+        k = s.active[i]
         slips |= size_across(s, s.closed[k // 3], s.rates[k : k + 3]) > 0.0
         presses &= s.cone.x[k] > WELL * size
     return slips and presses
