@@ -188,6 +188,7 @@ def test_numbers_of_numpy_become_numbers_of_python(given):
     assert not hasattr(value, "dtype") or isinstance(value, (str, float))
 
 
+@pytest.mark.slow
 def test_controllers_and_studies_take_numbers_of_numpy():
     controller = dap.Controller(every=np.float32(0.5), update=lambda t, state: {})
     assert type(controller.every) is float

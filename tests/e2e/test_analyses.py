@@ -4,6 +4,7 @@ import json
 
 import attrs
 import numpy as np
+import pytest
 from support import one_freedom
 
 import dap3d_core as dap
@@ -17,6 +18,7 @@ def press(folder):
     return scene
 
 
+@pytest.mark.slow
 def test_kinematics_and_inverse_dynamics_follow_each_other(dap3d):
     """The forces of the motion that kinematics has written are its own; from its table as well."""
     press(dap3d.folder)

@@ -159,6 +159,7 @@ def test_a_link_of_the_system_stays_and_its_pipe_is_refused(scene_file):
     assert sorted(p.name for p in folder.iterdir()) == ["fall.toml", "r.nc", "stdout.nc"]
 
 
+@pytest.mark.slow
 @posix
 def test_a_current_folder_that_is_gone_is_named(tmp_path):
     found = in_shell("mkdir gone && cd gone && rmdir ../gone && $DAP3D check pen1", tmp_path)

@@ -50,7 +50,7 @@ def test_more_inputs(name):
     TARGETS[name].run(1, COUNTS[name][1])
 
 
-@pytest.mark.every(27)
+@pytest.mark.every(100)
 @pytest.mark.parametrize("number", [1_000_014, 1357, 1477, 1_642_375, 2184, 1_000_076,
                                     6_569_051, 9_141_203, 5_192_180, 16_279_023,
                                     1_048_577, 1_159_636, 2021,

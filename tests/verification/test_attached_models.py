@@ -246,6 +246,7 @@ def test_files_that_cannot_be_attached(tmp_path):
         dap.import_model(path)
 
 
+@pytest.mark.slow
 def test_attached_models_have_a_bound(tmp_path):
     """Nine that attach nine each, of five levels, would be of 59049 arms."""
     for k in range(6):

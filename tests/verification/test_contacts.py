@@ -447,6 +447,7 @@ def test_a_gripper_of_three_pads_a_finger_lifts_what_stands(integrator):
     assert {event.kind for event in result.events} == {"touch", "lift"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mass", [1.46, 1.7])
 def test_a_gripper_slips_on_what_is_too_heavy_for_the_hoist(mass):
     """Pads of 2 x 10 N, mu = 0.8, lift 1.46 kg slower than 1.2 m/s^2, and leave 1.7 kg standing."""

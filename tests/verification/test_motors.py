@@ -257,7 +257,7 @@ def test_a_linear_model_has_the_moment_as_an_input():
     assert np.max(np.abs(linear.B)) == pytest.approx(J**-0.5, rel=1e-9)
 
 
-@pytest.mark.every(2)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "field", "name", "inertia"),
     [("rev", "torque", "angle", J), ("tran", "force", "length", M)],

@@ -94,6 +94,7 @@ def test_what_happens_elsewhere_does_not_change_how_feet_share():
     np.testing.assert_allclose(end_of(result), spinning(), rtol=0.0, atol=TOLERANCE)
 
 
+@pytest.mark.slow
 @long_in_plain_python
 @pytest.mark.parametrize("falls_from", [None, 0.5, 2.0])
 def test_a_box_pulled_until_it_slides_has_feet_of_one_stiffness(falls_from):

@@ -224,6 +224,7 @@ def test_values_that_a_scene_refuses_are_refused(tmp_path):
             run.step_to(0.1)
 
 
+@pytest.mark.slow
 def test_parameters_of_which_one_is_under_the_other_are_set_one_by_one(tmp_path):
     """In any order; where a run goes on they have to be in theirs."""
     scene = _written(SPRING, tmp_path)

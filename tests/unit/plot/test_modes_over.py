@@ -61,6 +61,7 @@ def test_direction_of_the_values_does_not_matter(found):
     np.testing.assert_allclose(*pieces, atol=2e-6)
 
 
+@pytest.mark.slow
 def test_growing_side_and_bar(found, tmp_path):
     """What grows is tinted; a bar has the values of the parameter."""
     from dap3d_core.plot import save_plot

@@ -80,6 +80,7 @@ def test_tests_of_an_editable_install_are_those_of_its_sources(install, tmp_path
     assert (tests.state, tests.words.split(" in ")[0]) == ("passed", "1 passed")
 
 
+@pytest.mark.slow
 def test_packages_without_tests_and_without_pytest(install, monkeypatch):
     """Nothing is wrong with the former; of the latter nothing is known."""
     install("three", {})

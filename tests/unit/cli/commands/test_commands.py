@@ -358,6 +358,7 @@ def test_of_two_that_write_one_file_at_once_one_wins_whole(tmp_path):
     assert len(list(tmp_path.iterdir())) == 50
 
 
+@pytest.mark.slow
 def test_of_several_that_overwrite_one_file_at_once_none_disturbs_another(tmp_path):
     """With force each of them succeeds, and the file is always that of one of them, whole."""
     target, texts = tmp_path / "run.nc", [letter * 5000 for letter in "abcd"]

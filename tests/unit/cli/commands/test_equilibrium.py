@@ -51,6 +51,7 @@ def test_json(model, capsys):
     assert len(data["stable"]) == len(data["given"]) == len(x)
 
 
+@pytest.mark.slow
 def test_table_fits_sixty_columns(model):
     """Given values and turning points, with the coordinate that changes most; a picture.
     To return is no failure; a note says how to go on."""

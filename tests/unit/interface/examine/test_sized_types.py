@@ -220,6 +220,7 @@ class Level(Joint):
         return tuple(r_points[k][2] - r_points[0][2] for k in range(1, n))
 
 
+@pytest.mark.slow
 def test_rows_are_counted_by_a_list():
     """One less than points; lists that are apart have one sample."""
     assert check_type(examine(Level)).ok

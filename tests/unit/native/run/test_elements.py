@@ -109,6 +109,7 @@ def test_contacts_have_derivatives_of_what_the_state_gives(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_outputs_of_the_scene_may_be_reactions(tmp_path):
     scene = _written(SPRING.replace('reach = "', 'held = "norm(track.force)"\nreach = "'), tmp_path)
     made, library = exported(scene, tmp_path)

@@ -106,6 +106,7 @@ def test_one_that_is_in_two_orders(tmp_path, monkeypatch):
     assert closed(*found_of(scene, names[1])) == (0.1, 0.9)
 
 
+@pytest.mark.slow
 def test_other_dependence_is_refused_and_inertias_wait(tmp_path):
     scene = braced(tmp_path)
     scene.parameters |= {"one": 0.2, "more": 0.3}

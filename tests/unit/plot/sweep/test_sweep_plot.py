@@ -247,6 +247,7 @@ def test_a_steep_map_has_colours_of_the_logarithm():
         assert bar.get_yscale() == scale
 
 
+@pytest.mark.slow
 def test_too_many_points_are_thinned_and_told():
     drawing = sweep_picture(grid(mass=np.arange(1, 1001), k=np.arange(1, 901)), ["bob.r.z:min"])
     panel = drawing.panels[0]

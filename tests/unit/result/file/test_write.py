@@ -247,6 +247,7 @@ def test_a_full_disk(tmp_path):
     assert os.listdir(tmp_path) == []
 
 
+@pytest.mark.slow
 def test_threads_may_write_and_read_at_once(tmp_path):
     """The NetCDF library is not made for threads: one at a time uses it."""
     result, _, _ = circling(nt=300)

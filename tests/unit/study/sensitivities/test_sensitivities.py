@@ -310,7 +310,7 @@ def test_starts_without_a_residual_are_left():
     assert np.all(np.isfinite(s.of("lower.r")))
 
 
-@pytest.mark.every(3)
+@pytest.mark.slow
 @pytest.mark.parametrize(("size", "side"), [(0.03, 1.0), (3.162e-3, -1.0)])
 @pytest.mark.parametrize("method", ["standard", "joint"])
 def test_derivatives_at_the_edge_of_a_length_of_tolerances_are_those_of_its_side(

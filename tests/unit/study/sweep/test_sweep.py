@@ -415,6 +415,7 @@ def test_mistakes_are_reported_together(changes, keys, words):
     assert words in str(refused.value)
 
 
+@pytest.mark.slow
 def test_a_sweep_without_room_is_refused(monkeypatch, tmp_path):
     """In memory and on the disk, with figures; force begins it all the same."""
     monkeypatch.setattr("dap3d_core.simulation.output.free_space._free_memory", lambda: 2**20)

@@ -121,7 +121,7 @@ PLANTED = [
 ]  # fmt: skip
 
 
-@pytest.mark.every(4)
+@pytest.mark.every(9)
 @pytest.mark.parametrize(
     ("type_", "failing", "words"), PLANTED, ids=[type_.__name__ for type_, *_ in PLANTED]
 )
@@ -133,6 +133,7 @@ def test_a_planted_error_is_found(type_, failing, words):
     assert re.search(words, said, re.DOTALL), said
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("type_", [Maxwell, Fed])
 def test_what_is_right_passes(type_):
     """Of a force and of a joint whose position row names a state, with the kernels compiled."""
@@ -193,7 +194,7 @@ def beside(r_P_i, a_j, radius):
     return add(r_P_i, scale(radius, cross(a_j, (0.6, 0.0, 0.8))))
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(5)
 @pytest.mark.parametrize(
     ("planted", "found"),
     [

@@ -118,6 +118,7 @@ def test_a_planted_error_is_found(type_, failing, words):
     assert re.search(words, said, re.DOTALL), said
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("type_", [OnSurface, Clipped])
 def test_what_is_right_passes(type_):
     assert all(check.run().ok for check in checks_for(type_))

@@ -132,6 +132,7 @@ def test_a_planted_error_is_found_and_named(type_, failing, words):
     assert any(words in finding.words for finding in report.findings), str(report)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     "type_",
     [Bounce, Clutch, Stage],  # those of plugins: tests/contract

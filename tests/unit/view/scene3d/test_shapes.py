@@ -54,6 +54,7 @@ def test_bad_ones_are_told(tmp_path, name, data):
     assert isinstance(shapes._mesh(tmp_path, name), str)
 
 
+@pytest.mark.slow
 def test_large_ones_are_not_read(tmp_path):
     with (tmp_path / "large.stl").open("wb") as file:
         file.truncate(read_mesh.LARGEST_MESH + 1)
