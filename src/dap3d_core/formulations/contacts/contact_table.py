@@ -14,9 +14,11 @@ from dap3d_core.formulations.contacts.contact_arrays import (
     ContactOutputs,
     contact_arrays,
 )
+from dap3d_core.formulations.contacts.forces import still_speed
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.switches import POSITION_ROUNDING
 from dap3d_core.interface.codegen.compile_loops import compiled_loop
+from dap3d_core.interface.contacts.rows import STILL, STILL_IN_ELLIPSE, direction
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled
@@ -164,6 +166,19 @@ class ContactTable:
     def across(self, c: int) -> slice:
         """The rows of slip of a contact."""
         return slice(0 if self.gapless[c] else 1, 3)
+
+    def put_directions(self, s: ContactArrays) -> None:
+        """Slips of what slides along its friction: of slow ones the first direction has a part.
+
+        They are as fast as what is not at rest: friction acts along them, however slow they are.
+        """
+        states = self.evaluator.states
+        for c in np.flatnonzero((states[self.mode] == 1.0) & ~self.alone).tolist():
+            frame, slip = s.frames[c], s.slip[c] @ s.frames[c]
+            still = STILL if s.ratio[c] == 1.0 else STILL_IN_ELLIPSE
+            size = max(np.linalg.norm(slip), 2.0 * still_speed(s, c))
+            d = direction(slip / s.arm[c], frame[0], states[self.way[c]], still)
+            s.slip[c] = size * (frame @ d)
 
 
 def words_of_drive(name: str, mu: float) -> str:

@@ -209,6 +209,7 @@ class ContactJumps(Jumps):
             sliding = np.where(modes == 1.0, slip, np.inf)
             closed = np.flatnonzero(modes > 0.5).tolist()
             s.touching[: len(closed)], s.touching_count = closed, len(closed)
+            table.put_directions(s)
             s.jammed = nearly_jams(s, AT_FLOOR if is_at_floor else NEARLY)
             if s.jammed >= 0:
                 self._stood, integration.work.status = (steps, t), Status.JUMPED
