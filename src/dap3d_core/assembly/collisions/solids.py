@@ -415,7 +415,7 @@ def clip(
     """Clip a polygon, or a line of two points, to a half space, in place; the corners left.
 
     Args:
-        work: rows of points; the polygon begins at ``start``, scratch of ``most`` rows at ``aside``.
+        work: rows of points; the polygon, and scratch of as many rows as it may have.
         start, count: first corner, and their number.
         aside, most: first row of scratch, and corners at most.
         x, y, z: normal of the half space, out of it.

@@ -24,7 +24,6 @@ from dap3d_core.integrators.moreau.problem import (
     CONTACT,
     ROW,
     find_groups,
-    is_in_turn,
     prepare_problem,
     root_of,
     solve,
@@ -107,7 +106,11 @@ def expected_of(
     A body that rests on another does not fall: forces of the last step go on, as ``end`` has them,
     but for those of this contact itself. most: what they may change it by.
     """
-    if s.bodies[c, 0] == 0 or s.bodies[c, 1] == 0 or s.slots[slot_of(memory, s.slots, s.key[c])] >= 0:
+    if (
+        s.bodies[c, 0] == 0
+        or s.bodies[c, 1] == 0
+        or s.slots[slot_of(memory, s.slots, s.key[c])] >= 0
+    ):
         return normal
     borne, _, _ = velocity_of(s, c, s.end)
     if borne == normal:
