@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.plain import long_in_plain_python
 from verification.test_stepping import G
 
 import dap3d_core as dap
@@ -81,6 +82,7 @@ def stack(contact, e, masses, t_end, h=None, e_floor=None):
     return dap.simulate(scene, t_end=t_end, dt=0.02, contact=contact, **settings)
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("masses", [(1.0, 1.0), (1.0, 3.0)])
 def test_a_ball_that_falls_on_one_that_rests_comes_back_to_its_height(masses):
     """e = 1: what the lower one gets it has back from the floor at once, at any step.
@@ -95,6 +97,7 @@ def test_a_ball_that_falls_on_one_that_rests_comes_back_to_its_height(masses):
     assert result.rd[-1] == pytest.approx(exact.rd[-1], abs=1e-12)
 
 
+@long_in_plain_python
 def test_balls_that_both_rise_have_the_second_order():
     """A light one on a heavy one: both rise, and meet again; a quarter of the step, a tenth left.
 
@@ -106,6 +109,7 @@ def test_balls_that_both_rise_have_the_second_order():
     assert off[1] < 0.1 * off[0]
 
 
+@long_in_plain_python
 @pytest.mark.parametrize(("e", "e_floor", "masses"), [
     (0.5, 0.5, (1.0, 1.0)),
     (0.8, 0.0, (3.0, 1.0)),
@@ -122,6 +126,7 @@ def test_balls_that_bounce_on_each_other_come_to_rest(e, e_floor, masses):
     assert abs(result.r[rest][:, :, 2] - [RADIUS, 3.0 * RADIUS]).max() < 1e-11
 
 
+@long_in_plain_python
 def test_a_rack_of_balls_keeps_energy_and_momentum():
     """Ten balls of unlike masses that touch each other, hit out of line, e = 1; limit: rounding."""
     scene, rng, masses = dap.Scene(name="rack"), np.random.default_rng(0), []
@@ -143,6 +148,7 @@ def test_a_rack_of_balls_keeps_energy_and_momentum():
     assert np.count_nonzero(np.linalg.norm(result.rd[-1], axis=1) > 0.01) >= 8
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("declared", [False, True])
 def test_pendulums_pass_an_impact_on(declared):
     """Five rods of 1 m on hinges, whose balls touch; the first falls from 0.3 rad, e = 1.
