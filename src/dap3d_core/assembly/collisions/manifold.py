@@ -4,6 +4,7 @@ import math
 
 from dap3d_core.assembly.collisions.distance import dot
 from dap3d_core.assembly.collisions.placed_shapes import GAP, PlacedShapes, add
+from dap3d_core.assembly.collisions.solids import clip
 from dap3d_core.assembly.collisions.supports import (
     CLIPPED_CORNERS,
     CORNERS,
@@ -69,28 +70,6 @@ def outline(work: Floats, start: int, count: int) -> int:
 
 
 @compiled
-def clip(work: Floats, start: int, count: int, x: Floats, limit: float, border: float) -> int:
-    """Clip a polygon, or a line of two points, to where x p <= limit, in place; its corners."""
-    left = 0
-    for k in range(count):
-        for c in range(3):
-            work[CLIPPED + k, c] = work[start + k, c]
-    for k in range(count):
-        p, q = work[CLIPPED + k], work[CLIPPED + (k + 1) % count]
-        a, b = dot(x, p) - limit, dot(x, q) - limit
-        if a <= border and left < CLIPPED_CORNERS:
-            for c in range(3):
-                work[start + left, c] = p[c]
-            left += 1
-        crosses = (a < -border and b > border) or (a > border and b < -border)
-        if crosses and left < CLIPPED_CORNERS and (count > 2 or k == 0):
-            for c in range(3):
-                work[start + left, c] = p[c] + a / (a - b) * (q[c] - p[c])
-            left += 1
-    return left
-
-
-@compiled
 def tangents(n: Floats, work: Floats) -> None:
     """Put two unit vectors across n."""
     e, f = work[E1], work[E2]
@@ -128,7 +107,8 @@ def inside(work: Floats, start: int, count: int, other: int, corners: int, size:
                 else:
                     x[c] = a * work[E1, c] + b * work[E2, c]
             at = dot(x, p) if corners > 2 else dot(x, q)
-            count = clip(work, start, count, x, at, BORDER * size)
+            count = clip(work, start, count, CLIPPED, CLIPPED_CORNERS, x[0], x[1], x[2], at,
+                         BORDER * size)  # fmt: skip
     return count
 
 

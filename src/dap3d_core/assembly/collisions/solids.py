@@ -21,8 +21,8 @@ PARALLEL = 1e-12
 PARALLEL_EDGES = 1e-8
 #: Part of the size by which edges have to part boxes better than faces do.
 BETTER = 1e-6
-#: Part of the size within which a point lies on the border of a face.
-BORDER = 1e-9
+#: Part of the size within which a point lies on the border of a face; times it points are one.
+BORDER, SAME = 1e-9, 4.0
 
 
 @compiled
@@ -359,23 +359,34 @@ def _face(
     side = 1.0 if side >= 0.0 else -1.0
     nx, ny, nz = side * u[axis], side * u[3 + axis], side * u[6 + axis]
     _put_facing(shapes, other, nx, ny, nz)
-    corners, polygon = 4, shapes.scratch
+    corners, polygon, half = 4, shapes.scratch, CORNERS // 2
     border = BORDER * (shapes.size[owner, 0] + shapes.size[owner, 1] + shapes.size[owner, 2])
     for k in range(4):
         across = (axis + 1 + k // 2) % 3
         sign = 2.0 * (k % 2) - 1.0
         x, y, z = sign * u[across], sign * u[3 + across], sign * u[6 + across]
         limit = shapes.size[owner, across] + d[0] * x + d[1] * y + d[2] * z
-        corners = _clip(polygon, corners, x, y, z, limit, border)
+        corners = clip(polygon, 0, corners, half, half, x, y, z, limit, border)
     level = shapes.size[owner, axis] + d[0] * nx + d[1] * ny + d[2] * nz
     sign = 1.0 if owner == j else -1.0
+    last, near = 0, (SAME * border) ** 2
     for k in range(corners):
         p = polygon[k]
+        if k > 0 and min(square_between(p, polygon[0]), square_between(p, polygon[last])) <= near:
+            continue  # of a strip as narrow as the border
+        last = k
         gap = p[0] * nx + p[1] * ny + p[2] * nz - level
         back = gap if owner == j else 0.0  # the point on the surface of shape j
         count = add(shapes, count, i, j, 16 * axis + k, p[0] - back * nx, p[1] - back * ny,
                     p[2] - back * nz, sign * nx, sign * ny, sign * nz, gap)  # fmt: skip
     return count
+
+
+@compiled
+def square_between(p: Floats, q: Floats) -> float:
+    """Square of the distance of two points, m^2."""
+    x, y, z = p[0] - q[0], p[1] - q[1], p[2] - q[2]
+    return x * x + y * y + z * z
 
 
 @compiled
@@ -397,25 +408,36 @@ def _put_facing(shapes: PlacedShapes, box: int, nx: float, ny: float, nz: float)
 
 
 @compiled
-def _clip(
-    polygon: Floats, corners: int, x: float, y: float, z: float, limit: float, border: float
-) -> int:
-    """Clip a polygon to a half space, in place; the number of corners that are left."""
-    half, left = CORNERS // 2, 0
-    for k in range(corners):
+def clip(
+    work: Floats, start: int, count: int, aside: int, most: int, x: float, y: float, z: float,
+    limit: float, border: float,
+) -> int:  # fmt: skip
+    """Clip a polygon, or a line of two points, to a half space, in place; the corners left.
+
+    Args:
+        work: rows of points; the polygon, and scratch of as many rows as it may have.
+        start, count: first corner, and their number.
+        aside, most: first row of scratch, and corners at most.
+        x, y, z: normal of the half space, out of it.
+        limit: of products with that, m.
+        border: a corner so near to the limit is on it, m.
+    """
+    left = 0
+    for k in range(count):
         for c in range(3):
-            polygon[half + k, c] = polygon[k, c]
-    for k in range(corners):
-        p, q = polygon[half + k], polygon[half + (k + 1) % corners]
+            work[aside + k, c] = work[start + k, c]
+    for k in range(count):
+        p, q = work[aside + k], work[aside + (k + 1) % count]
         a = p[0] * x + p[1] * y + p[2] * z - limit
         b = q[0] * x + q[1] * y + q[2] * z - limit
-        if a <= border and left < half:
+        if a <= border and left < most:
             for c in range(3):
-                polygon[left, c] = p[c]
+                work[start + left, c] = p[c]
             left += 1
-        if ((a < -border and b > border) or (a > border and b < -border)) and left < half:
+        crosses = (a < -border and b > border) or (a > border and b < -border)
+        if crosses and left < most and (count > 2 or k == 0):  # a line has one edge
             s = a / (a - b)
             for c in range(3):
-                polygon[left, c] = p[c] + s * (q[c] - p[c])
+                work[start + left, c] = p[c] + s * (q[c] - p[c])
             left += 1
     return left

@@ -75,6 +75,7 @@ class StepArrays(Arrays):
     bit_size = _integer()  # words of bits
     held_count = _integer()  # contacts that scratch of held ones is needed for
     carries = _integer()  # 1: r and s are of the masses that light links carry
+    turn = _integer()  # round of an impact whose problem is solved; 0: that of the step
     is_exported = _integer()  # 1: Python makes no room, and takes no log
     # constants
     light_count = _integer()  # bodies that carry far heavier ones
@@ -116,6 +117,7 @@ class StepArrays(Arrays):
     path: Matrix  # means of velocities of motion without contacts, with accelerations ``pushed``
     hit: Floats  # the part of the step at which a body is hit
     flies: Floats  # the part of its change without contacts that these do not bear else
+    jump: Matrix  # (n + 1, 6) what rounds of an impact change its velocities by
     bounce: Matrix  # (n + 1, 5) of each group (restitution.py)
     v_bounce: Matrix  # (n + 1, 6), (c, 3), (k,) what bounces lead to
     x_bounce: Matrix
@@ -140,6 +142,8 @@ class StepArrays(Arrays):
     chosen: Integers  # contacts of a group that is solved
     collides: Integers  # STOPS, BOUNCES, STAYS or 0; the part of the step at which it closes
     closing: Floats
+    takes: Integers  # the last round of an impact in which it takes part, or -1
+    strike: Matrix  # (c, 2) of impacts (restitution.py)
     J: Matrix  # (c, 36) rows of the velocity of body i less that of j: normal, tangents
     moved: Matrix  # the same times M^-1
     own: Matrix  # (c, 9) J M^-1 J^T of each
@@ -282,7 +286,7 @@ def _of_bodies(model: Model) -> dict[str, Any]:
         **{name: np.zeros((n + 1, 9)) for name in ("Jp", "Jp_inverse", "spin", "spin_inverse")},
         **{name: np.zeros((n + 1, 6)) for name in (
             "before", "free", "v", "delta", "trial", "rest", "trial_rest", "end", "path",
-            "v_bounce")},
+            "v_bounce", "jump")},
         "bounce": np.zeros((n + 1, 5)),
         "carried": np.zeros((n + 1, 2)),
         **{name: np.zeros(n + 1) for name in (
@@ -305,14 +309,14 @@ def _of_bodies(model: Model) -> dict[str, Any]:
 
 def _of_contacts(room: int) -> dict[str, Any]:
     """Arrays of so many contacts."""
-    widths = {"J": 36, "moved": 36, "met": MET,
+    widths = {"J": 36, "moved": 36, "met": MET, "strike": 2,
               **dict.fromkeys(("own", "own_held", "B", "B_factored"), 9),
               **dict.fromkeys(("x", "u", "z", "bias", "push", "kept", "missing", "x_bounce"),
                               3)}  # fmt: skip
     return {
         "bodies": np.zeros((room, 2), dtype=np.int64),
         **{name: np.zeros(room, dtype=np.int64) for name in (
-            "key", "kind", "under", "group", "next_contact", "chosen", "collides")},
+            "key", "kind", "under", "group", "next_contact", "chosen", "collides", "takes")},
         **{name: np.zeros(room) for name in ("gap", "mu", "rim", "e", "r", "closing")},
         **{name: np.zeros((room, width)) for name, width in widths.items()},
     }  # fmt: skip

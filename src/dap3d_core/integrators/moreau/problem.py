@@ -371,13 +371,22 @@ def root_of(parent: Integers, b: int) -> int:
 
 
 @compiled
+def is_in_turn(s: StepArrays, c: int) -> bool:
+    """True if a contact is of the problem that is solved: in a round of an impact if it answers."""
+    return s.turn == 0 or s.takes[c] == s.turn
+
+
+@compiled
 def find_groups(s: StepArrays) -> None:
-    """Find the group of each contact, by its least body, and in ``parent`` those of bodies."""
+    """Find the group of each contact, by its least body, and in ``parent`` those of bodies.
+
+    In a round of an impact contacts that take part alone connect.
+    """
     for b in range(s.parent.size):
         s.parent[b] = s.machine[b]
     for c in range(s.contact_count):
         i, j = s.bodies[c, 0], s.bodies[c, 1]
-        if i > 0 and j > 0:
+        if i > 0 and j > 0 and is_in_turn(s, c):
             i, j = root_of(s.parent, i), root_of(s.parent, j)
             s.parent[max(i, j)] = min(i, j)
     for c in range(s.contact_count):
@@ -395,8 +404,9 @@ def list_groups(s: StepArrays) -> None:
         g = root_of(s.parent, b)
         s.next_body[b], s.first[g, BODY] = s.first[g, BODY], b
     for c in range(s.contact_count - 1, -1, -1):
-        g = s.group[c]
-        s.next_contact[c], s.first[g, CONTACT] = s.first[g, CONTACT], c
+        if is_in_turn(s, c):
+            g = s.group[c]
+            s.next_contact[c], s.first[g, CONTACT] = s.first[g, CONTACT], c
     for k in range(s.y.size - 1, -1, -1):
         g = root_of(s.parent, s.row_owner[k])
         s.next_row[k], s.first[g, ROW] = s.first[g, ROW], k

@@ -1,5 +1,6 @@
 """What collides, and moves then; bounces with friction that give no more energy than they take.
 
+Impacts travel through bodies that touch in rounds, as at events (formulations/contacts/impacts.py).
 Newton's law with friction may gain energy (Kane, Levinson, Dynamics: theory and applications, 1985,
 sec. 5.8). Where it would, impulses are a mean of these and of those without a bounce: cones are
 convex, and without a bounce nothing is gained.
@@ -11,18 +12,35 @@ convex, and without a bounce nothing is gained.
 import math
 from typing import Any
 
-from dap3d_core.assembly.evaluate import copy
+from dap3d_core.assembly.evaluate import copy, zero
+from dap3d_core.formulations.contacts.impacts import AT_REST, ROUNDS
 from dap3d_core.integrators.moreau.arrays import BOUNCES, CONE, STOPS, StepArrays
 from dap3d_core.integrators.moreau.contact_set import velocity_of
 from dap3d_core.integrators.moreau.gauss_seidel import copy_impulses
-from dap3d_core.integrators.moreau.newton import TINY, product_of
-from dap3d_core.integrators.moreau.problem import BODY, CONTACT, ROW, find_groups, root_of, solve
+from dap3d_core.integrators.moreau.impulses import slot_of
+from dap3d_core.integrators.moreau.newton import TINY, product_of, speed_of
+from dap3d_core.integrators.moreau.problem import (
+    BODY,
+    CONTACT,
+    ROW,
+    find_groups,
+    prepare_problem,
+    root_of,
+    solve,
+)
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: Columns of ``bounce``: work of the impulses of a group with the bounce, half of it, and without;
 #: the sum of the magnitudes of its parts; how much of the bounce is kept.
 WITH, HALF, WITHOUT, EXCHANGED, KEPT = range(5)
+#: Columns in rounds: whether something of a group is hit, something is not; the largest e.
+STRUCK, SPARED, ELASTIC = range(3)
+#: Columns of ``strike``: what a normal velocity changes by until the gap closes, m/s; the bias of
+#: the step.
+FALLEN, WAS = range(2)
+#: The turn of contacts behind several rounds.
+BEHIND = ROUNDS + 1
 #: Work that is rounding, as a part of what is exchanged.
 GAIN_ROUNDING = 1e-12
 #: Gaps, m of a scene of ordinary size, below which overlaps are left.
@@ -34,12 +52,12 @@ COLLIDES = 4.0
 
 
 @compiled
-def put_bias(s: StepArrays) -> bool:
-    """What is added to normal velocities, and when bodies are hit; True if bodies collide."""
-    fall, found = 0.0, False
-    for b in range(s.free.shape[0]):
-        for k in range(3):
-            fall = max(fall, abs(s.free[b, k] - s.before[b, k]))
+def put_bias(s: StepArrays, memory: Floats) -> bool:
+    """What is added to normal velocities, and when bodies are hit; True if bodies collide.
+
+    memory: impulses of the last step, whose places are in ``slots``.
+    """
+    fall, found = fall_of(s), False
     for c in range(s.contact_count):
         bias, s.collides[c] = s.bias[c], 0
         bias[0] = bias[1] = bias[2] = 0.0
@@ -49,7 +67,9 @@ def put_bias(s: StepArrays) -> bool:
         normal, _, _ = velocity_of(s, c, s.free)
         change, gap = max(fall, abs(normal - approach)), max(s.gap[c], 0.0)  # by turning, too
         if approach < -COLLIDES * change and gap + s.h * min(approach, normal) < 0.0:
+            normal = expected_of(s, c, approach, normal, change, memory)
             s.closing[c] = closing_of(gap, s.h * approach, s.h * (normal - approach))
+            s.strike[c, FALLEN] = s.closing[c] * (normal - approach)
             last = 1.0 - s.closing[c]
             back = last * (normal - approach) - s.e[c] * (normal - last * (normal - approach))
             if s.e[c] > 0.0 and back > 0.0:
@@ -68,6 +88,37 @@ def put_bias(s: StepArrays) -> bool:
 
 
 @compiled
+def fall_of(s: StepArrays) -> float:
+    """The largest change of a velocity without contacts, m/s."""
+    fall = 0.0
+    for b in range(s.free.shape[0]):
+        for k in range(3):
+            fall = max(fall, abs(s.free[b, k] - s.before[b, k]))
+    return fall
+
+
+@compiled
+def expected_of(
+    s: StepArrays, c: int, approach: float, normal: float, most: float, memory: Floats
+) -> float:
+    """The normal velocity of a contact that collides at the end of the step, without that, m/s.
+
+    A body that rests on another does not fall: forces of the last step go on, as ``end`` has them,
+    but for those of this contact itself. most: what they may change it by.
+    """
+    if (
+        s.bodies[c, 0] == 0
+        or s.bodies[c, 1] == 0
+        or s.slots[slot_of(memory, s.slots, s.key[c])] >= 0
+    ):
+        return normal
+    borne, _, _ = velocity_of(s, c, s.end)
+    if borne == normal:
+        return normal
+    return min(max(borne, approach - most), approach + most)
+
+
+@compiled
 def put_hits(s: StepArrays, any_collides: bool) -> None:
     """When bodies are hit, as parts of the step: all of a group at the first instant."""
     for b in range(s.hit.size):
@@ -79,11 +130,177 @@ def put_hits(s: StepArrays, any_collides: bool) -> None:
         if s.collides[c] != 0:
             s.hit[s.group[c]] = min(s.hit[s.group[c]], s.closing[c])
     spread(s, s.hit)
+    for b in range(s.hit.size):
+        zero(s.jump[b])
+
+
+# ------------------------------------------------------------------ rounds
+
+
+@compiled
+def choose_struck(s: StepArrays) -> bool:
+    """Mark by 0 the contacts that rounds may be of, by -1 others; True if there are any.
+
+    Where all of a group is hit, or nothing bounces, one problem of all has the same velocities.
+    """
+    found, of_group = False, s.bounce
+    for g in range(of_group.shape[0]):
+        zero(of_group[g])
+    for c in range(s.contact_count):
+        if s.kind[c] == CONE:
+            row = of_group[s.group[c]]
+            row[STRUCK if is_hit(s, c) else SPARED] = 1.0
+            row[ELASTIC] = max(row[ELASTIC], s.e[c])
+    for c in range(s.contact_count):
+        row, s.takes[c] = of_group[s.group[c]], -1
+        if s.kind[c] == CONE and min(row[STRUCK], row[SPARED], row[ELASTIC]) > 0.0:
+            s.takes[c], found = 0, True
+    for b in range(s.jump.shape[0] if found else 0):
+        for k in range(6):
+            s.jump[b, k] = s.end[b, k] - s.before[b, k]  # without an impact
+    return found
+
+
+@compiled
+def is_hit(s: StepArrays, c: int) -> bool:
+    """True if a contact collides by itself."""
+    return s.collides[c] == STOPS or s.collides[c] == BOUNCES
+
+
+@compiled
+def pass_on(s: StepArrays, tolerance: float) -> bool:
+    """Let impacts travel through what touches, in rounds; False without room.
+
+    In each of them what approaches answers, by Newton's law. Behind the last one contacts bear what
+    they still do, and normal velocities then are what the step asks for. Rounds begin with
+    velocities of the start of the step, by which what rests does not approach; what is hit has
+    besides what it falls by until its gap closes.
+    """
+    has_room, fall = True, fall_of(s)
+    prepare_problem(s)
+    zero(s.y_bounce)
+    for c in range(s.contact_count):
+        zero(s.x_bounce[c])
+        s.strike[c, WAS] = s.bias[c, 0]
+    for b in range(s.free.shape[0]):
+        copy(s.v_bounce[b], s.free[b])
+        copy(s.free[b], s.before[b])
+    while has_room and s.turn < ROUNDS and take_part(s, fall):
+        has_room = solve_turn(s, tolerance)
+    s.turn = 0
+    any_passed = put_behind(s)
+    if any_passed and has_room:
+        s.turn = BEHIND
+        has_room = solve_turn(s, tolerance)
+        s.turn = 0
+        ask_for(s)
+    for b in range(s.free.shape[0]):
+        copy(s.free[b], s.v_bounce[b])
+    return has_room
+
+
+@compiled
+def solve_turn(s: StepArrays, tolerance: float) -> bool:
+    """Solve the problem of a round, and take its velocities as ``free``; False without room.
+
+    Impulses are summed up.
+    """
+    for k in range(s.y.size):
+        s.y[k], s.free_speed[k] = 0.0, speed_of(s, k, s.free)
+    for c in range(s.contact_count):
+        zero(s.x[c])
+    has_room = solve(s, tolerance)
+    for b in range(s.free.shape[0]):
+        copy(s.free[b], s.v[b])
+    for k in range(s.y.size):
+        s.y_bounce[k] += s.y[k]
+    for c in range(s.contact_count):
+        for k in range(3):
+            s.x_bounce[c, k] += s.x[c, k]
+    return has_room
+
+
+@compiled
+def take_part(s: StepArrays, fall: float) -> bool:
+    """Choose what answers in the next round, and its bias; False if nothing does."""
+    found, first = False, s.turn == 0
+    s.turn += 1
+    for c in range(s.contact_count):
+        if s.under[c] >= 0 or s.takes[c] < 0:
+            continue
+        hit, strike = is_hit(s, c), s.strike[c]
+        fallen = strike[FALLEN] if hit else 0.0
+        speed, _, _ = velocity_of(s, c, s.free)
+        speed += fallen
+        least = max((1.0 - s.e[c]) * COLLIDES * fall, AT_REST * s.length)
+        if not hit:  # it closes within the step
+            least = max(least, strike[WAS])
+        if hit if first else speed < -least:
+            s.takes[c], found = s.turn, True
+            s.bias[c, 0] = fallen + s.e[c] * min(speed, 0.0)
+    for c in range(s.contact_count):
+        if s.under[c] >= 0:
+            s.takes[c] = s.takes[s.under[c]]
+    return found
+
+
+@compiled
+def put_behind(s: StepArrays) -> bool:
+    """Put velocities at the end of the step by those behind the last round; True if several were.
+
+    Of groups with one round alone none approaches behind it, and the step has its velocities as it
+    is.
+    """
+    found, last = False, s.flies
+    find_groups(s)
+    for c in range(s.contact_count):
+        g = s.group[c]
+        last[g] = 0.0 if s.takes[c] >= 2 else last[g]
+    for c in range(s.contact_count):
+        passed = last[s.group[c]] == 0.0
+        s.takes[c], found = BEHIND if passed else -1, found or passed
+        s.bias[c, 0] = 0.0 if passed and is_hit(s, c) else s.strike[c, WAS]
+    for b in range(s.free.shape[0]):
+        first = min(s.hit[b], 1.0)
+        for k in range(6):
+            fallen, s.jump[b, k] = first * s.jump[b, k], s.free[b, k] - s.before[b, k]
+            s.free[b, k] += fallen + (1.0 - first) * (s.v_bounce[b, k] - s.before[b, k])
+        if last[root_of(s.parent, b)] != 0.0:
+            zero(s.jump[b])
+    return found
+
+
+@compiled
+def ask_for(s: StepArrays) -> None:
+    """Put biases by which the step has the normal velocities ``free`` of what rounds pushed."""
+    for c in range(s.contact_count):
+        if s.takes[c] < 0 or s.kind[c] != CONE:
+            continue
+        back, _, _ = velocity_of(s, c, s.free)
+        if s.x_bounce[c, 0] > 0.0 and back > 0.0:
+            s.collides[c], s.bias[c, 0] = BOUNCES, -back
+        elif is_hit(s, c):
+            s.collides[c] = STOPS
+
+
+@compiled
+def recall_rounds(s: StepArrays) -> None:
+    """Try first the impulses of all rounds."""
+    find_groups(s)
+    for c in range(s.contact_count):
+        if s.takes[c] == BEHIND:
+            copy(s.x[c], s.x_bounce[c])
+    for k in range(s.y.size):
+        if s.flies[root_of(s.parent, s.row_owner[k])] == 0.0:
+            s.y[k] = s.y_bounce[k]
+
+
+# ------------------------------------------------------------------ bounces
 
 
 @compiled
 def put_flies(s: StepArrays) -> None:
-    """Mark the groups of which something stops, or is borne, by 0."""
+    """Mark the groups of which something stops, or is borne, by 0, as those of rounds are."""
     find_groups(s)
     for c in range(s.contact_count):
         if s.collides[c] != BOUNCES and (s.collides[c] == STOPS or s.x[c, 0] > 0.0):
@@ -220,7 +437,8 @@ def put_falls(s: StepArrays) -> None:
         if s.hit[b] != NOT_HIT and s.flies[b] == 0.0:
             whole = sums[s.machine[b]]
             for k in range(6):
-                s.change[k], s.turned[k] = s.free[b, k] - s.before[b, k], s.free[b, k] - s.end[b, k]
+                s.change[k] = s.free[b, k] - s.before[b, k]
+                s.turned[k] = s.free[b, k] + s.jump[b, k] - s.end[b, k]
             whole[0] += product_of(s.change, s.turned, s.mass[b], s.spin[b])
             whole[1] += product_of(s.change, s.change, s.mass[b], s.spin[b])
     for b in range(1, s.end.shape[0]):

@@ -157,6 +157,7 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     """Find impulses of contacts, and velocities ``end`` behind them; False without room."""
     y, trial, n = work.state[at.Y], work.state[at.TRIAL], s.mass.size - 1
     free_motion.take_velocities(y, n, s.before)
+    free_motion.take_velocities(trial, n, s.end)
     free_motion.take_velocities(trial, n, s.free)
     for b in range(1, n + 1 if work.pushed[0, 0] != 0.0 else 1):
         for k in range(6):
@@ -176,11 +177,12 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         for b in range(n + 1):
             copy(s.end[b], s.free[b])
         return True
-    any_collides = restitution.put_bias(s)
+    impulses.order_memory(work.memory, s.slots)
+    any_collides = restitution.put_bias(s, work.memory)
+    passes_on = any_collides and restitution.choose_struck(s)
     if s.declared_law.size > 0 and not contact_set.find_grips(work.t, s, system, loops):
         work.t_stop, work.status, s.stage = work.t, at.DRIVEN, 0
         return False
-    impulses.order_memory(work.memory, s.slots)
     turns = stay_closed(work, s)
     if turns:
         if not contact_set.turn_rows(work.t + 0.5 * s.h, put_middle(work, s), s, system, loops):
@@ -189,7 +191,11 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         contact_set.evaluate_rows(work.t, y, False, s, system, loops)
     for c in range(s.touch_count if s.resistance_count > 0 else 0):
         contact_set.put_resistances(c, s)
-    if not solve_fitted(work, s, turns, system, loops):
+    if passes_on:
+        impulses.recall(work, s)  # coefficients of friction
+        if not restitution.pass_on(s, work.rtol):
+            return False
+    if not solve_fitted(work, s, turns, passes_on, system, loops):
         return False
     if any_collides:
         restitution.put_flies(s)
@@ -205,12 +211,19 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
 
 
 @compiled
-def solve_fitted(work: Any, s: StepArrays, turns: bool, system: System, loops: Any) -> bool:
-    """Solve the step's problem; turns: with rows halfway through the step. False without room."""
+def solve_fitted(
+    work: Any, s: StepArrays, turns: bool, passes_on: bool, system: System, loops: Any
+) -> bool:
+    """Solve the step's problem; False without room.
+
+    turns: with rows halfway through the step. passes_on: behind rounds of an impact.
+    """
     for k in range(s.y.size):
         s.free_speed[k] = speed_of(s, k, s.free)
     left = FITS if s.y.size > 0 else 0
     impulses.recall(work, s)
+    if passes_on:
+        restitution.recall_rounds(s)
     while True:
         prepare_problem(s)
         if not solve(s, work.rtol):

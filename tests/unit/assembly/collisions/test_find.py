@@ -269,3 +269,21 @@ def test_all_pairs_of_near_spheres_are_found(largest):
     i, j = np.nonzero(np.triu(distance < radii[:, None] + radii + 0.02, 1))
     pairs = [tuple(sorted(pair)) for pair in found.shapes.tolist()]
     assert sorted(pairs) == list(zip(i.tolist(), j.tolist(), strict=True))
+
+
+@pytest.mark.parametrize(("at", "angle", "count"), [
+    ([0.5, 0.6, 0.4], 0.0, 2),  # along half an edge, which was clipped there and back
+    ([0.5, 0.6, 0.4], 4e-9, 2),
+    ([1.0, 0.5, 0.4], 0.0, 2),
+    ([1.0, 0.6, 0.4], 0.0, 1),  # at a corner
+    ([1.0 - 1e-9, 0.6 - 2e-9, 0.4], 2e-9, 1),  # a strip as narrow as rounding
+    ([0.5, 0.3, 0.4], 0.0, 4),
+])  # fmt: skip
+def test_points_of_boxes_in_line_are_found_once(at, angle, count):
+    """Two boxes of 1 m x 0.6 m x 0.4 m, one on the other: corners of the face they share."""
+    sizes = [[0.5, 0.3, 0.2]] * 2
+    turned = [np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle)]
+    for p in ([[1.0, 0.0, 0.0, 0.0], turned], [turned, [1.0, 0.0, 0.0, 0.0]]):
+        shapes = finder([BOX, BOX], sizes)
+        found = shapes.find([[0.0, 0.0, 0.0], at], p, np.array([0.0, 1e-3, 1e-3]))
+        assert len(found.point) == count
