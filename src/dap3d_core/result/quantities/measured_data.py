@@ -52,7 +52,6 @@ class MeasuredData:
             parts.append(values[label][..., measured] / sigma)
         return np.concatenate(parts, axis=-1)
 
-
     def unlike(self, label: str, unit: str) -> str:
         """What is wrong with the unit in a file of a quantity in another one; "" where they agree.
 

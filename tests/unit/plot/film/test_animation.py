@@ -293,7 +293,7 @@ def test_what_is_in_front_hides_what_is_behind(balls):
     shapes = shapes_of(scene, ["a"], ["#000000"], still=True)
     assert (len(shapes.triangles) > MOST_TRIANGLES) == (balls > 0)
     corners, colors = shapes.seen(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0, 0.0]]), camera)
-    x = corners - camera.project(np.array([*back, 0.25]) + [0.1, 0.05, 0.0])
+    x = corners - camera.project(np.array([back[0] + 0.1, back[1] + 0.05, 0.25]))
     y = np.roll(x, -1, axis=1)
     ways = x[..., 0] * y[..., 1] - x[..., 1] * y[..., 0]
     around = np.all(ways > 0.0, axis=1) | np.all(ways < 0.0, axis=1)
