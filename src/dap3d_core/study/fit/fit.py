@@ -178,8 +178,8 @@ def _output_mistakes(
     mistakes = [
         Mistake("measured", o.name, what, f"{o.of}.x") for o in outputs if o.name not in expanded
     ]
-    for label, unit in ensemble.units.items() if data else ():
-        if what := data.unlike(label, unit):
+    for label, unit in ensemble.units.items():
+        if data is not None and (what := data.unlike(label, unit)):
             mistakes.append(Mistake(f"measured.{label}", MISSING, what))
     units = sorted(set(ensemble.units.values()))
     if not mistakes and len(units) > 1 and not has_sigma:
