@@ -230,13 +230,20 @@ def test_a_law_that_jumps_or_drives_is_found():
         def grip(speed, mu, mu_s):
             return where(speed > 0.0, mu, mu_s + 0.1)
 
+    class Later(Stribeck):
+        keyword = "test-later"
+
+        def grip(speed, mu, mu_s):
+            return where(speed > 0.2, mu, mu_s + 0.1)
+
     class Driving(Stribeck):
         keyword = "test-driving"
 
         def grip(speed):
             return 0.3 - 10.0 * speed
 
-    for class_, words in ((Jump, "grip jumps"), (Driving, "would drive")):
+    laws = (Jump, "grip jumps where slip"), (Later, "as slip becomes"), (Driving, "would drive")
+    for class_, words in laws:
         (check,) = [check for check in checks_for(class_) if check.name == "grip"]
         assert words in str(check.run())
 

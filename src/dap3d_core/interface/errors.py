@@ -1,10 +1,12 @@
 """The error of an unusable type: where the fault is in the author's file, and its remedy."""
 
+import os
 import re
 from collections.abc import Callable, Collection
 from difflib import get_close_matches
 from errno import ENOMEM
 from inspect import get_annotations, getsourcefile, unwrap
+from pathlib import Path
 from traceback import extract_tb
 from typing import Any
 
@@ -16,6 +18,8 @@ from dap3d_core.interface.fields import specs_of
 MAKERS = {"Point": "point", "Vector": "vector", "Vector2": "vector2", "Body": "body"}
 #: What a scene names a type by, after the distribution and a colon where two have one of its name.
 KEYWORD = re.compile(r"\w(?:[\w.-]*\w)?")
+#: Where this program is.
+OWN = f"{Path(__file__).parents[1]}{os.sep}"
 #: Of the dynamic linker, and of threads.
 MEMORY_WORDS = ("failed to map segment", "cannot allocate memory", "can't start new thread")
 
@@ -61,10 +65,18 @@ def where_is(type_: type) -> str:
     return f"{file}: {type_.__name__}"
 
 
+def is_own(kernel: Callable[..., Any]) -> bool:
+    """True for a function of this program, which calls those of an author."""
+    return unwrap(kernel).__code__.co_filename.startswith(OWN)
+
+
 def line_of(error: BaseException, kernel: Callable[..., Any]) -> str:
     """The line of the author's file in which an exception arose: " [FILE:LINE]"."""
-    file = unwrap(kernel).__code__.co_filename
-    lines = [f.lineno for f in extract_tb(error.__traceback__) if f.filename == file]
+    file, frames = unwrap(kernel).__code__.co_filename, extract_tb(error.__traceback__)
+    if is_own(kernel):
+        files = [frame.filename for frame in frames if not frame.filename.startswith(OWN)]
+        file = files[-1] if files else file
+    lines = [f.lineno for f in frames if f.filename == file]
     return f" [{file}:{lines[-1]}]" if lines else ""
 
 

@@ -42,8 +42,16 @@ def example_of(type_info: "TypeInfo", registry: "Registry") -> str:
     )
     scene.add(type_info, name)
     if type_.kind == "function" and type_.arguments == 1:
-        scene.add(scene.first("joint", lambda joint: bool(joint.layout.functions)), "J1", name)
+        scene.add(scene.first("joint", _is_driver), "J1", name)
     return scene.text()
+
+
+def _is_driver(joint: "TypeInfo") -> bool:
+    """True for a joint that a function of time moves, and that takes no lists, as cables do."""
+    from dap3d_core.interface.fields import specs_of
+
+    has_list = any(field.size for field in specs_of(joint.type).values())
+    return bool(joint.layout.functions) and not has_list
 
 
 def _has_friction(type_info: "TypeInfo") -> bool:

@@ -44,9 +44,11 @@ from dap3d_core.interface.element_states import unknown_names
 from dap3d_core.interface.errors import (
     PluginError,
     fault_of_keyword,
+    is_own,
     line_of,
     name_hint,
     no_field,
+    plain_words,
     where_is,
 )
 from dap3d_core.interface.examine.constants import prepared, set_ends
@@ -56,7 +58,7 @@ from dap3d_core.interface.examine.random_values import (
     random_pose,
     random_quantity,
 )
-from dap3d_core.interface.fields import SLOTS, sized_fields, slot_of, specs_of
+from dap3d_core.interface.fields import SLOTS, FieldSpec, sized_fields, slot_of, specs_of
 from dap3d_core.interface.types import SYMBOLS, Force, Function, Joint, TypeBase
 
 #: Random inputs a type may refuse, or be undefined for, before it counts as broken.
@@ -180,6 +182,8 @@ def _output(
 
                 if error.name in kernel_words:
                     reason += f"; from dap3d_core.kernels import {error.name}"
+            if isinstance(error, TypeError) and is_own(kernel):  # of numbers with rates
+                reason += f"; {plain_words()}"
             raise PluginError(f"{who} failed on a random input: {reason}") from error
         scalars = [value_at(value, path) for path in paths]
         wrong = [x for x in scalars if isinstance(x, bool) or not isinstance(x, (int, float))]
@@ -323,6 +327,20 @@ def _check_rows(type_: type[Joint]) -> None:
         raise PluginError(f"{who}.holonomic needs one truth value for each of its {rows} rows")
 
 
+def _fault_of_default(spec: FieldSpec) -> str:
+    """The reason why a scene could not give a number as its default is; "" where it could."""
+    x = spec.default
+    if spec.required or x is None or spec.by_name:
+        return ""
+    if isinstance(x, bool) or not isinstance(x, (int, float)) or not math.isfinite(x):
+        return "which is no finite number"
+    if spec.positive and x <= 0.0:
+        return "and is to be positive"
+    low = -math.inf if spec.minimum is None else spec.minimum
+    high = math.inf if spec.maximum is None else spec.maximum
+    return "" if low <= x <= high else "which is out of its bounds"
+
+
 def _check_fields(type_: type[TypeBase]) -> None:
     who, specs = where_is(type_), specs_of(type_)
     if sum(spec.kind == "vector2" for spec in specs.values()) > 1:
@@ -336,6 +354,8 @@ def _check_fields(type_: type[TypeBase]) -> None:
         other = specs.get(spec.across)
         if spec.across and (other is None or other.kind != "vector"):
             raise PluginError(f"{who}.{name} is across {spec.across}, which is no vector field")
+        if spec.kind == "number" and (fault := _fault_of_default(spec)):
+            raise PluginError(f"{who}.{name} has the default {spec.default!r}, {fault}")
         if name in taken:
             raise PluginError(f"{who} has a field {name}, which is the body's; take another name")
         if name in reactions:
@@ -378,6 +398,7 @@ def _check_names(
     type_: type[TypeBase], kernel: str, wanted: tuple[str, ...], names: Mapping[str, KernelArgument]
 ) -> None:
     who = f"{where_is(type_)}.{kernel}"
+    unseen = {name for name, spec in specs_of(type_).items() if not spec.given}
     for name in wanted:
         if name not in names:
             hint = name_hint(type_, name, names)
@@ -385,7 +406,7 @@ def _check_names(
                 hint = f"reactions are known to {' and '.join(READING)} alone; "
             raise PluginError(
                 f"{who} asks for {name}, which its fields do not offer; {hint}"
-                f"they offer {', '.join(names)}"
+                f"they offer {', '.join(n for n in names if n not in unseen)}"
             )
         if names[name].velocity and kernel not in VELOCITY_KERNELS:
             raise PluginError(

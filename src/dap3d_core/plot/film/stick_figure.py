@@ -320,10 +320,13 @@ def shapes_of(
     notes = list(shapes.notes)
     parts = [(part, part.vertices) for part in parts_of(shapes.marks, shapes.meshes)]
     size = max((float(np.max(np.ptp(local, axis=0))) for _, local in parts), default=0.0)
-    room = MOST_TRIANGLES - sum(len(part.form.triangles) for part, _ in parts)
+    used = sum(len(part.form.triangles) for part, _ in parts)
+    room = min(max(MOST_TRIANGLES - used, MOST_TRIANGLES * still), most - used)
+    large = [_edges(local[part.form.triangles]).max(initial=0.0) > LONGEST * size
+             for part, local in parts]  # fmt: skip
     pieces = []
     for done, (part, local) in enumerate(parts):
-        extra = room // (len(parts) - done)
+        extra = room // max(1, sum(large[done:]))
         pieces.append((part.body, *_divided(local, part.form.triangles, size, extra), part.color))
         room -= len(pieces[-1][2]) - len(part.form.triangles)
     for line in shapes.lines:  # triangles without an area, whose edges are visible
@@ -357,6 +360,11 @@ def _rgb(color: str) -> tuple[float, float, float]:
     return to_rgb(color) if is_color_like(color) else to_rgb(GROUND_COLOR)
 
 
+def _edges(corners: Floats) -> Floats:
+    """Lengths (q, 3) of the edges of triangles (q, 3, 3)."""
+    return np.asarray(np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2))
+
+
 def _divided(
     local: Floats, triangles: Integers, size: float, extra: int
 ) -> tuple[Floats, Integers]:
@@ -367,8 +375,7 @@ def _divided(
     most = len(triangles) + extra
     corners = local[triangles]
     for _ in range(4):
-        edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
-        long = edges.max(axis=1) > LONGEST * size
+        long = _edges(corners).max(axis=1) > LONGEST * size
         if not long.any() or 3 * long.sum() + len(corners) > most:
             break
         a, b, c = corners[long].swapaxes(0, 1)

@@ -50,6 +50,8 @@ class Lock:
                 self._dropped.popleft().close()
 
 
+#: Ends of names that promise what is not written.
+OTHER_FORMATS = (".csv", ".json", ".mat", ".toml", ".txt", ".xlsx")
 #: The NetCDF library is not thread-safe; every use of it holds this lock.
 NETCDF = Lock()
 
@@ -111,8 +113,13 @@ def created(path: Path, target: Path) -> Iterator[Any]:
     target: name of the file in error messages.
 
     Raises:
-        ResultError: the library, or the system, refuses.
+        ResultError: the library, or the system, refuses; or the name promises another format.
     """
+    if target.suffix.lower() in OTHER_FORMATS:
+        raise ResultError(
+            f"cannot write {target}: what is written is a NetCDF file, such as {target.stem}.nc; "
+            "dap3d post and dap3d export make others of it"
+        )
     with NETCDF, writing(target):
         dataset = opened(path, "w")
         try:

@@ -290,16 +290,25 @@ def _attributes(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]
     """Names that may follow an owner."""
     names = ACTIONS if owner.slot else QUANTITIES[owner.kind]
     is_actuator = owner.name in result.record.actuation
-    known = (name for name in names if name != ACTUATION or is_actuator)
+    known = [name for name in names if name != ACTUATION or is_actuator]
     own = [*states_of(result.summary, owner), *unknowns_of(result, owner)]
     if owner.kind == "joint" and not owner.slot:
         with suppress(ResultError, UnknownNameError):  # where the model for them is at hand
             own += result.coordinates(owner.name).names
+    if owner.kind == "force" and not owner.slot:
+        with suppress(ResultError):  # as above
+            try:
+                output = result.force(owner.name)
+            except UnknownNameError:  # it acts on every body
+                return ()
+            known = [name for name in known if getattr(output, name, name) is not None]
     return (*known, *own)
 
 
 def _fault(result: QuantitySource, owner: QuantityOwner, rest: list[str]) -> str:
     attributes = _attributes(result, owner)
+    if not attributes:
+        return f"the {owner.kind} {owner.label!r} has no quantities: it acts on no body of its own"
     if not rest:
         return f"which quantity of the {owner.kind} {owner.label!r}: {', '.join(attributes)}"
     if rest[0] not in attributes:

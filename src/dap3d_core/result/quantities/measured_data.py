@@ -29,12 +29,14 @@ class MeasuredData:
         values: label -> (nt,) measured, SI; NaN where nothing was measured.
         quantities: label -> name of the quantity in results.
         sigma: label -> (nt,) standard deviations; empty where they are unknown.
+        units: label -> unit in the header of a file, where it has one.
     """
 
     t: Floats
     values: dict[str, Floats]
     quantities: dict[str, str]
     sigma: dict[str, Floats]
+    units: dict[str, str] = attrs.field(factory=dict)
 
     @property
     def count(self) -> int:
@@ -50,6 +52,21 @@ class MeasuredData:
             parts.append(values[label][..., measured] / sigma)
         return np.concatenate(parts, axis=-1)
 
+    def unlike(self, label: str, unit: str) -> str:
+        """What is wrong with the unit in a file of a quantity in another one; "" where they agree.
+
+        unit: of the quantity, "" where it is not known.
+        """
+        given = self.units.get(label, "")
+        if not given or not unit or _plain(given) == _plain(unit):
+            return ""
+        return f"the file has it in {given}, and it is in {unit}: convert the column"
+
+
+def _plain(unit: str) -> str:
+    """A unit without what people write differently: N*m and N m, m/s² and m/s^2."""
+    return "".join(c for c in unit.replace("²", "2").replace("-", "1") if c not in " *·.^")
+
 
 def is_number(value: Any) -> bool:
     """True for one number that is no truth value."""
@@ -61,7 +78,8 @@ def read_measured(
 ) -> tuple[MeasuredData | None, dict[str, str], list[Mistake]]:
     """Measured data as ``fit`` takes them, None with mistakes; label -> quantity; the mistakes."""
     mistakes: list[Mistake] = []
-    columns = _columns(measured, mistakes)
+    units: dict[str, str] = {}
+    columns = _columns(measured, units, mistakes)
     if mistakes:
         return None, {}, mistakes
     named = [name for name in TIMES if name in columns]
@@ -69,6 +87,9 @@ def read_measured(
         remedy = f"there are {', '.join(columns)}" if columns else ""
         what = "the times of the measurements are missing: a column called t, in s"
         return None, {}, [Mistake("measured", MISSING, what, remedy=remedy)]
+    if units.get(named[0], "") not in ("", "s"):
+        what = f"times are in s, and not in {units[named[0]]}: convert the column"
+        mistakes.append(Mistake(f"measured.{named[0]}", MISSING, what))
     times = _numbers(named[0], columns.pop(named[0]), mistakes)
     chosen = _chosen(columns, outputs, mistakes)
     values = {label: _numbers(label, columns[label], mistakes) for label in chosen}
@@ -93,13 +114,13 @@ def read_measured(
     deviations = {} if mistakes or sigma is None else _deviations(sigma, good, mistakes)
     if mistakes or times is None:
         return None, chosen, mistakes
-    return MeasuredData(times, good, chosen, deviations), chosen, []
+    return MeasuredData(times, good, chosen, deviations, units), chosen, []
 
 
-def _columns(measured: Any, mistakes: list[Mistake]) -> dict[str, Any]:
-    """Name -> values of a CSV file, a mapping, a data frame or a data set."""
+def _columns(measured: Any, units: dict[str, str], mistakes: list[Mistake]) -> dict[str, Any]:
+    """Name -> values of a CSV file, a mapping, a data frame or a data set; units of the file."""
     if isinstance(measured, (str, os.PathLike)):
-        return _read_csv(Path(measured), mistakes)
+        return _read_csv(Path(measured), units, mistakes)
     if hasattr(measured, "data_vars"):
         return {str(name): variable.values for name, variable in measured.variables.items()
                 if name in TIMES or name in measured.data_vars}  # fmt: skip
@@ -113,8 +134,8 @@ def _columns(measured: Any, mistakes: list[Mistake]) -> dict[str, Any]:
     return {}
 
 
-def _read_csv(path: Path, mistakes: list[Mistake]) -> dict[str, Any]:
-    """The columns of a CSV file, without units in brackets after names and # lines."""
+def _read_csv(path: Path, units: dict[str, str], mistakes: list[Mistake]) -> dict[str, Any]:
+    """The columns of a CSV file, but # lines; units, in brackets after names, by name."""
     try:
         lines = io.StringIO(read_regular(path).decode("utf-8-sig"), newline="")
         rows = [(k, row) for k, row in enumerate(csv.reader(lines), start=1)
@@ -126,7 +147,14 @@ def _read_csv(path: Path, mistakes: list[Mistake]) -> dict[str, Any]:
     if not rows:
         mistakes.append(Mistake("measured", str(path), "the file is empty"))
         return {}
-    names = [head.partition("[")[0].strip() for head in rows[0][1]]
+    heads = [head.partition("[") for head in rows[0][1]]
+    names = [head[0].strip() for head in heads]
+    units.update((name, head[2].strip(" ]")) for name, head in zip(names, heads, strict=True))
+    between = next((c for c in ";\t" if len(names) == 1 and c in names[0]), "")
+    if between:
+        what = f"columns are between commas, not {between!r}; a number has a decimal point"
+        mistakes.append(Mistake("measured", MISSING, what, file=str(path), line=rows[0][0]))
+        return {}
     for name in {n for n in names if names.count(n) > 1}:
         what = "two columns have this name"
         mistakes.append(Mistake(f"measured.{name}", MISSING, what, file=str(path), line=rows[0][0]))

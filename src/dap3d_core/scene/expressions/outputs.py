@@ -37,7 +37,8 @@ def read_outputs(report: Collector) -> dict[str, Expression]:
     numbers = parameters_of(report) if report.scene.outputs else {}
     for name, value in report.scene.outputs.items():
         key: Key = ("outputs", str(name))
-        if fault := fault_of_quantity(report.scene, name):
+        fault = fault_of_quantity(report.scene, name)
+        if fault:
             report.add(key, name, f"not a name for an output: {fault}")
         unit = ""
         if isinstance(value, dict):
@@ -46,7 +47,7 @@ def read_outputs(report: Collector) -> dict[str, Expression]:
                 unit = report.read((*key, "unit"), value["unit"], _read_unit)
             key, value = (*key, "value"), value.get("value", MISSING)
         expression = report.read(key, value, read_expression)
-        if not isinstance(expression, Fault) and not isinstance(unit, Fault):
+        if not fault and not isinstance(expression, Fault) and not isinstance(unit, Fault):
             expressions[name] = attrs.evolve(expression.with_numbers(numbers), unit=unit)
     return _in_order(report, expressions)
 

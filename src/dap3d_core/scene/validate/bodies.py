@@ -124,8 +124,15 @@ def _orientation(report: Collector, name: str, body: Body) -> Any:
         return NO_TURN
     [(field, value)] = given.items()
     reader = coerce_values.from_rpy if field == "rpy" else coerce_values.from_axis_angle
-    p = report.read(("bodies", name, field), value, reader)
-    return NO_TURN if isinstance(p, coerce_values.Fault) else p
+    key = ("bodies", name, field)
+    p = report.read(key, value, reader)
+    if isinstance(p, coerce_values.Fault):
+        return NO_TURN
+    numbers = [x for x in value[0 if field == "rpy" else 3 :] if not isinstance(x, str)]
+    if max(map(abs, numbers), default=0.0) > coerce_values.TURN:
+        text = f"{dotted(key)} = {list(value)}: an angle {coerce_values.MANY_TURNS}"
+        report.note(text, "angles beyond a turn")
+    return p
 
 
 def _inertias(report: Collector, names: tuple[str, ...], bodies: list[Body]) -> Floats:

@@ -28,6 +28,7 @@ SHORTEST = 1e-12
 MOST_FAULTS = 4
 #: An angle beyond a full turn is probably given in degrees.
 TURN = 6.283185307179586
+MANY_TURNS = "is more than a full turn; angles are in rad"
 
 
 class Fault(NamedTuple):
@@ -61,6 +62,8 @@ def _number_fault(value: Any) -> Fault:
             remedy = "write a number without its unit, in SI units"
             if (unit := written[number.end() :].strip()) in ("deg", "rpm", "mm"):
                 remedy += f', or "= {number[0]} * {unit}" in a scene with [parameters]'
+        elif is_short and written.isidentifier():
+            remedy = f'write "= {written}" for a parameter'
         return Fault(f"{should}, not text", remedy)
     if type(value) is bool:
         return Fault(f"{should}, not a truth value")
@@ -320,7 +323,7 @@ def unusual_value_note(spec: FieldSpec, value: Any) -> str:
         if high is not None and value > high:
             return f"is more than {high:g}, which is unusual; it is used as it is"
         if spec.unit == "rad" and abs(value) > TURN:
-            return "is more than a full turn; angles are in rad"
+            return MANY_TURNS
     elif spec.direction and spec.kind == "vec3":
         length = sum(x * x for x in value) ** 0.5
         if length == 0.0:

@@ -27,6 +27,12 @@ Located = tuple[int, tuple[float, ...]]
 #: Points and vectors of every body, which need no declaration.
 ORIGIN = {"O": ZERO}
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+#: How a scene declares what is given by name.
+DECLARED = {
+    "point": "[points.NAME] with body and sPp",
+    "vector": "[vectors.NAME] with body and sp",
+    "vector2": "[vectors2.NAME] with P_i and P_j",
+}
 #: Body index of a reference already reported as a mistake.
 BAD = -1
 
@@ -200,7 +206,8 @@ def missing_words(
         remedy = _numbered(name, declared)
         return f"should be the name of a {kind} (text), not a number", "", remedy
     if not isinstance(name, str):
-        return f"should be the name of a {kind}", "", ""
+        remedy = f"declare one, {DECLARED[kind]}, and give its name" if kind in DECLARED else ""
+        return f"should be the name of a {kind}", "", remedy
     words, near = f"there is no {kind} {name!r}", report.nearest(name, declared)
     if name and declared and not near:
         few = ", ".join(islice(declared, 8)) + (", ..." if len(declared) > 8 else "")

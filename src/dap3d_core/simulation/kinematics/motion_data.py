@@ -304,6 +304,8 @@ class _Fit:
         """Refuse quantities that positions do not change: velocities, forces."""
         for label, slope in zip(self._labels, slopes, strict=True):
             size = self._length if self._units[label] == "m" else 1.0
+            if words := self.data.unlike(label, self._units[label]):
+                raise SceneError([Mistake(f"motion.{label}", MISSING, words)])
             if np.max(np.abs(slope * self._spans)) <= NOTHING * SPAN * size:
                 words = (
                     "positions do not change this quantity: a motion is given by positions "

@@ -66,7 +66,9 @@ class Observer:
             self._step = (self._of.t - self._t) / (steps - self._steps)
             self._t, self._steps = self._of.t, steps
         kinetic, work = self._energies(self._of.y)
-        self._largest = max(self._largest, kinetic, abs(work - self._start[1]))
+        # Chunks may end where a motion turns back, and all work is undone.
+        done = max(abs(work - self._start[1]), self._of.largest_work)
+        self._largest = max(self._largest, kinetic, done)
         imbalance = (kinetic - self._start[0]) - (work - self._start[1])
         drift = abs(imbalance) / self._largest if self._largest else 0.0
         self._watch(RunProgress(self._of.t, self._t_end, self._earlier + steps, self._step, drift))

@@ -192,7 +192,8 @@ class Redundancy:
             "acceleration": "what they ask of the accelerations disagrees by",
         }
         return [
-            f"{some(c.joints, MOST_NAMES)} contradict each other: {what[c.level]} {c.size:.3g}"
+            f"{'rows of ' if len(c.joints) == 1 else ''}{some(c.joints, MOST_NAMES)} contradict "
+            f"each other: {what[c.level]} {c.size:.3g}"
             for c in self.contradictions
         ] + [binding.words for binding in self.bindings]
 

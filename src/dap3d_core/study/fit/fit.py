@@ -80,8 +80,8 @@ def fit(
         parameters: dotted name -> start, (start, low, high) or a ``Parameter``; names alone start
             from the value in the scene. ``forces.spring.k``, ``points.A.sPp.x``.
         measured: {"t": times, "mass.r.x": values}, an xarray.Dataset, or the path of a CSV file
-            with a header (units in brackets are left out). Any times from 0 in any order, s; SI
-            units; NaN, in a file nothing, where a quantity was not measured.
+            with a header, whose units in brackets have to be those of the quantities. Any times
+            from 0 in any order, s; SI units; NaN, in a file nothing, where one was not measured.
         outputs: columns that are used, or column -> name of its quantity; by default all.
         sigma: standard deviation of the data: a number, or for each output one or (nt,). Without
             it all data have the same one, which is estimated from the residuals; outputs of
@@ -136,7 +136,8 @@ def _read(
     except SceneError as error:
         mistakes += error.mistakes
     series = tuple(Output(label, of, "series") for label, of in quantities.items())
-    mistakes += _output_mistakes(own, series, allow_code, announce, has_sigma=sigma is not None)
+    has_sigma = sigma is not None
+    mistakes += _output_mistakes(own, series, data, allow_code, announce, has_sigma=has_sigma)
     if data is not None:
         last = float(data.t.max())
         if isinstance(t_end, (int, float)) and t_end < last:
@@ -157,6 +158,7 @@ def _read(
 def _output_mistakes(
     scene: Scene,
     outputs: tuple[Output, ...],
+    data: MeasuredData | None,
     allow_code: bool,
     announce: Announce | None,
     *,
@@ -168,13 +170,17 @@ def _output_mistakes(
     try:
         ensemble = Ensemble(Study(probed, (), outputs, allow_code), announce)
     except SceneError as error:
-        return [attrs.evolve(m, key="measured" if m.key == "outputs" else m.key)
-                for m in error.mistakes]  # fmt: skip
+        named = "give outputs={COLUMN: QUANTITY} for columns of other names"
+        return [attrs.evolve(m, key="measured", remedy=m.remedy or named)
+                if m.key == "outputs" else m for m in error.mistakes]  # fmt: skip
     expanded = {output.name for output in ensemble.outputs}
     what = "a column is one number: name a component of this vector"
     mistakes = [
         Mistake("measured", o.name, what, f"{o.of}.x") for o in outputs if o.name not in expanded
     ]
+    for label, unit in ensemble.units.items():
+        if data is not None and (what := data.unlike(label, unit)):
+            mistakes.append(Mistake(f"measured.{label}", MISSING, what))
     units = sorted(set(ensemble.units.values()))
     if not mistakes and len(units) > 1 and not has_sigma:
         what = f"outputs in {', '.join(units)} are weighed by their standard deviations"

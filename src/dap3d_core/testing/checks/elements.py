@@ -66,9 +66,15 @@ _WRONG_OF_TWO = (
 _LONG = "the normal is {x.is_:.6g} long; of another length than 1 forces, slip and gaps differ"
 #: Part of its speed at which slip is next to nothing, and tolerance of coefficients there.
 SLOW, CONTINUOUS = 1e-9, 1e-6
+#: Speeds of slip at which coefficients are looked at, and halvings of what is between two of them.
+SPEEDS, HALVINGS = 145, 50
 _DRIVES = "grip gives {x.is_:.3g}: a negative coefficient of friction would drive"
 _SPEEDS_UP = "resist gives {x.is_:.3g} m for {what}: what resists by a negative length would drive"
 _NONE = "grip gives none along the grain, and {x.is_:.3g} across it; take a small one"
+_STEPS = (
+    "grip jumps from {x.should:.6g} to {x.is_:.6g} as slip becomes faster; let it change over a "
+    "small range of speeds"
+)
 _JUMPS = (
     "grip jumps where slip begins: it gives {x.is_:.6g} at next to no speed and {x.should:.6g} at "
     "none"
@@ -170,7 +176,29 @@ def grip(subject: SampledType) -> CheckOutcome:
         c.compare(sample, np.minimum(mu, 0.0), 0.0, _DRIVES)
         c.compare(sample, np.where(mu[::2] == 0.0, mu[1::2], 0.0), 0.0, _NONE)
         c.compare(sample, near[:2], near[2:], _JUMPS, tolerance=CONTINUOUS)
+        below, above = _largest_step(sample)
+        c.compare(sample, above, below, _STEPS, tolerance=CONTINUOUS)
     return c.outcome()
+
+
+def _largest_step(sample: Sample) -> tuple[Floats, Floats]:
+    """Coefficients (2,) on both sides of the speed near which they change most."""
+
+    def at(speed: float) -> Floats:
+        return sample.value("tension", sample.state.at_speed(speed))[-4:-2]
+
+    speeds = np.geomspace(SLOW, 1.0 / SLOW, SPEEDS)
+    found = np.array([at(speed) for speed in speeds])
+    k = int(np.argmax(np.max(np.abs(np.diff(found, axis=0)), axis=1)))
+    low, high, below, above = speeds[k], speeds[k + 1], found[k], found[k + 1]
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        there = at(middle)
+        if np.max(np.abs(there - below)) > np.max(np.abs(above - there)):
+            high, above = middle, there
+        else:
+            low, below = middle, there
+    return below, above
 
 
 def resist(subject: SampledType) -> CheckOutcome:

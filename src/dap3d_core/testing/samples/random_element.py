@@ -276,7 +276,9 @@ def draw(
         idx += [1]
     poses = {s: pose(state.r[k + 1], state.p[k + 1]) for k, s in enumerate(slots)}
     values = _values(type_info, fields, poses, rng)
-    shown = {n: v for n, v in fields.items() if isinstance(v, (bool, int, float, str, tuple))}
+    seen = {n for n, spec in specs_of(type_info.type).items() if spec.given}
+    shown = {n: v for n, v in fields.items()
+             if n in seen and isinstance(v, (bool, int, float, str, tuple))}  # fmt: skip
     count = getattr(type_info.type, "rows", 0) + (load[-1] + 1 if load else 0)
     lam = numbers(rng, count or sample_size(type_info))
     return RandomElement(shown, tuple(idx), tuple(_numbers(type_info, values, rng)), lam)

@@ -132,6 +132,8 @@ def test_a_required_function_is_in_the_example():
     scene = tomllib.loads(text)
     assert scene["joints"]["J1"]["function"] in scene["functions"]
     registry = dap.load_registry()
+    text = example_of(registry.get("function", "step"), registry)
+    assert tomllib.loads(text)["joints"]["J1"]["type"] == "drive-rot"
     text = example_of(registry.get("force", "ptp"), registry)
     assert "function" not in next(iter(tomllib.loads(text)["forces"].values()))
 

@@ -59,3 +59,22 @@ def test_a_machine_does_not_feel_the_impact_of_another_one():
     falls, rests = motion(HIGH, 0.0)
     assert np.abs(falls - motion(HIGH)[0]).max() < 1e-11
     assert np.abs(rests - motion(0.0)[0]).max() < 1e-11
+
+
+def test_where_joints_let_nothing_press_rounding_is_no_residual():
+    """A finger that a driver holds flush with the floor, and another moves along it."""
+    scene = dap.Scene(name="finger")
+    scene.add_body("hand", mass=1.0, Jp=[0.01] * 3, r=[0, 0, 0.3])
+    scene.add_body("finger", mass=0.2, Jp=[1e-3] * 3, r=[-0.1, 0, 0.1])
+    scene.add_point("rail", "hand", [0, 0, -0.2])
+    scene.add_joint("tran", "slide", P_i="finger.O", P_j="rail", a_j="hand.x")
+    scene.add_joint("tran", "lift", P_i="hand.O", P_j="ground.O", a_j="ground.z")
+    scene.add_joint("motor", "holds", joint="lift", position=0.0)
+    scene.add_force("motor", "close", joint="slide", force=20.0)
+    scene.add_force("weight", "gravity")
+    scene.add_shape("box", body="finger", size=[0.02, 0.06, 0.1], at=[0, 0, -0.05], collides=True)
+    scene.add_shape("plane", body="ground", collides=True)
+    scene.add_collisions()
+    result = dap.simulate(scene, t_end=0.01, dt=0.01)
+    assert result.ledger["residual"].value < 1e-12
+    assert abs(result.quantity("holds.force.z").values - 1.2 * 9.81).max() < 1e-12

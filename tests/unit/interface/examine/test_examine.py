@@ -7,6 +7,7 @@ import pytest
 
 from dap3d_core.interface import (
     Body,
+    Contact,
     Force,
     Function,
     Joint,
@@ -154,6 +155,10 @@ def prepare(constants):
          ["more than one vector2", "ends P_i and P_j", "sub(r_Q_j, r_Q_i)"]),
         (joint(fields={"a_i": (Vector, vector(across="b_j"))}),
          ["a_i is across b_j, which is no vector field"]),
+        (joint(fields={"k": (float, number("100"))}), ["default '100', which is no finite number"]),
+        (joint(fields={"k": (float, number(-1.0, positive=True))}),
+         ["Mine.k has the default -1.0, and is to be positive"]),
+        (joint(fields={"k": (float, number(3, maximum=2.0))}), ["which is out of its bounds"]),
         # prepare
         (joint(prepare=prepare(None)), ["Mine.prepare should return a dict", "None"]),
         (joint(prepare=prepare([1.0])), ["Mine.prepare should return a dict", "[1.0]"]),
@@ -178,6 +183,27 @@ def test_what_is_wrong_with_a_type_is_said(type_, words):
     said = refusal(type_)
     for word in words:
         assert word in said
+
+
+def test_a_contact_written_with_math_is_told_its_own_line():
+    """What fails is derived from it; what derivation needs of it is said."""
+
+    class Mine(Contact):
+        keyword = "mine"
+        P_i: Point = point()
+
+        def gap(r_P_i):
+            return r_P_i[2]
+
+        def at(r_P_i):
+            return r_P_i
+
+        def normal(r_P_i):
+            return (math.sin(r_P_i[0]), 0.0, math.cos(r_P_i[0]))
+
+    said, line = refusal(Mine), Mine.normal.__code__.co_firstlineno + 1
+    assert f"[{__file__}:{line}]" in said
+    assert "from dap3d_core.kernels, not from math or numpy" in said
 
 
 def test_what_looks_like_a_field_and_is_none_is_said():

@@ -15,7 +15,13 @@ import dap3d_core as dap
 from dap3d_core.plot.film.animation import frame_times, usual_speed
 from dap3d_core.plot.film.frame import Stage
 from dap3d_core.plot.film.projection import camera_of, visible_rectangle, with_margin
-from dap3d_core.plot.film.stick_figure import SHADES, pose_at, shapes_of, sticks_of
+from dap3d_core.plot.film.stick_figure import (
+    MOST_TRIANGLES,
+    SHADES,
+    pose_at,
+    shapes_of,
+    sticks_of,
+)
 from dap3d_core.result import ResultError, UnknownNameError
 from dap3d_core.scene import AnimationPoint
 
@@ -271,18 +277,27 @@ def test_a_colour_that_is_none_is_grey(tmp_path):
     assert np.ptp(to_rgb(color)) < 0.1
 
 
-def test_what_is_in_front_hides_what_is_behind():
-    """Of two boxes one over the other the upper one is seen, also where the lower one is large."""
+@pytest.mark.parametrize("balls", [0, 100])
+def test_what_is_in_front_hides_what_is_behind(balls):
+    """Of two boxes one over the other the upper one is seen, also where the lower one is large,
+    and in a picture of so many triangles that a film has none to spare."""
+    camera = camera_of("-60,22", np.zeros((3, 2)))
+    back = -3.5 * np.sign(camera.towards[:2])  # where the floor is farther than in its middle
     scene = dap.Scene(name="pile")
     scene.add_body("a")
     scene.add_shape("box", "floor", body="a", size=[9.0, 9.0, 0.2], color="#ff0000")
-    scene.add_shape("box", "roof", body="a", size=[0.5, 0.5, 0.2], at=[4.0, 4.0, 0.5],
+    scene.add_shape("box", "roof", body="a", size=[0.5, 0.5, 0.2], at=[*back, 0.15],
                     color="#0000ff")  # fmt: skip
-    shapes = shapes_of(scene, ["a"], ["#000000"])
-    camera = camera_of("z", np.zeros((3, 2)))
+    for k in range(balls):
+        scene.add_shape("sphere", body="a", radius=0.1, at=[*-back, 0.01 * k])
+    shapes = shapes_of(scene, ["a"], ["#000000"], still=True)
+    assert (len(shapes.triangles) > MOST_TRIANGLES) == (balls > 0)
     corners, colors = shapes.seen(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0, 0.0]]), camera)
-    over = np.all(np.abs(corners.mean(axis=1) - [4.0, 4.0]) < 0.2, axis=1)
-    last = np.flatnonzero(over)[-1]
+    x = corners - camera.project(np.array([back[0] + 0.1, back[1] + 0.05, 0.25]))
+    y = np.roll(x, -1, axis=1)
+    ways = x[..., 0] * y[..., 1] - x[..., 1] * y[..., 0]
+    around = np.all(ways > 0.0, axis=1) | np.all(ways < 0.0, axis=1)
+    last = np.flatnonzero(around)[-1]
     assert colors[last, 2] > colors[last, 0]
 
 

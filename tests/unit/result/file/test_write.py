@@ -179,6 +179,17 @@ def test_a_write_that_fails_leaves_nothing_and_the_old_file(tmp_path, monkeypatc
     assert os.listdir(tmp_path) == ["run.nc"]
 
 
+@pytest.mark.parametrize("name", ["a.csv", "a.MAT"])
+def test_a_name_that_promises_another_format_is_refused(tmp_path, name):
+    """To save a result, and to write one during its run."""
+    result = dap.simulate("pen1", t_end=0.1, dt=0.1)
+    with pytest.raises(ResultError, match=r"such as a\.nc; dap3d post and dap3d export"):
+        result.save(tmp_path / name)
+    with pytest.raises(ResultError, match=r"such as a\.nc"):
+        dap.simulate("pen1", t_end=0.1, dt=0.1, output=tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_an_existing_file_is_kept_unless_forced(tmp_path):
     path = tmp_path / "run.nc"
     path.write_text("precious")

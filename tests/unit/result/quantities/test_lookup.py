@@ -172,6 +172,26 @@ def test_what_is_wrong_with_a_name(result, wrong, words):
     assert words in str(caught.value)
 
 
+def test_only_what_the_type_of_a_force_has_is_listed():
+    """A moment has no length and no tension, and weight has nothing."""
+    scene = dap.Scene()
+    scene.add_body("a", mass=1.0, Jp=[1, 1, 1], r=[1, 0, 0])
+    scene.add_force("ptp", "spring", P_i="a.O", P_j="ground.O", k=1.0)
+    scene.add_force("n", "twist", body_i="a", n=[1.0, 0.0, 0.0])
+    scene.add_force("weight", "gravity")
+    found, told = dap.simulate(scene, t_end=0.1, dt=0.1), {}
+    for name in scene.forces:
+        with pytest.raises(UnknownNameError) as caught:
+            found.quantity(name)
+        told[name] = str(caught.value).rpartition(": ")[2]
+    actions = "force, moment, force_body, moment_body, moment_at_point"
+    assert told == {
+        "spring": f"{actions}, length, length_rate, tension, energy",
+        "twist": actions,
+        "gravity": "it acts on no body of its own",
+    }
+
+
 @pytest.fixture(scope="module")
 def with_states():
     """A run of two forces with states, one of them with two."""

@@ -64,6 +64,16 @@ def test_outputs_of_nothing_are_told_with_other_mistakes(tmp_path):
     assert found["outputs.q0"].nearest == "stone"
 
 
+def test_the_name_of_a_body_is_one_mistake():
+    """What it names is the body, and no circle."""
+    scene = dap.Scene()
+    scene.add_body("a", mass=1.0, Jp=(1.0, 1.0, 1.0))
+    scene.outputs["a"] = "a.r.x"
+    with pytest.raises(dap.SceneError, match="there is one of this name in bodies") as caught:
+        dap.simulate(scene, t_end=1.0)
+    assert len(caught.value.mistakes) == 1
+
+
 def test_a_circle_of_several_is_told_in_its_order(tmp_path):
     mistake = mistake_of(tmp_path, "a = 'b + 1'\nb = 'c.x'\nc = 'a * stone.r'\n")
     assert any(circle in mistake.what for circle in ("a -> b -> c -> a", "b -> c -> a -> b",

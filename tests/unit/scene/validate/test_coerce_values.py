@@ -142,3 +142,25 @@ def test_angles_of_types_may_be_given_in_degrees_and_rates_in_turns():
     words = r'k = "3 deg": should be a number, not text\n +write a number .* or "= 3 \* deg"'
     with pytest.raises(dap.SceneError, match=words):
         check(scene, dap.load_registry())
+
+
+def test_orientations_in_degrees_are_noted():
+    """Only numbers beyond a turn; texts, and the length of an axis, are what they say."""
+    scene = dap.Scene()
+    given = {"a": {"rpy": (0, 0, 90)}, "b": {"rpy": (0, 0, "900 deg")},
+             "c": {"axis_angle": (0, 90, 0, 1)}, "d": {"axis_angle": [0, 1, 0, -30.0]}}  # fmt: skip
+    for name, turn in given.items():
+        scene.add_body(name, mass=1.0, Jp=(1.0, 1.0, 1.0), **turn)
+    assert [note for note in check(scene, dap.load_registry()).notes if "turn" in note] == [
+        "bodies.a.rpy = [0, 0, 90]: an angle is more than a full turn; angles are in rad",
+        "bodies.d.axis_angle = [0, 1, 0, -30.0]: an angle is more than a full turn; "
+        "angles are in rad",
+    ]
+
+
+def test_the_name_of_a_parameter_gets_its_sign():
+    scene = dap.Scene()
+    scene.parameters["m"] = 2.0
+    scene.add_body("a", mass="m", Jp=(1.0, 1.0, 1.0))
+    with pytest.raises(dap.SceneError, match='write "= m" for a parameter'):
+        check(scene, dap.load_registry())

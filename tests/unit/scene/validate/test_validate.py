@@ -318,6 +318,18 @@ def test_what_cannot_be_combined_is_refused(combinations, words):
     assert len(caught.value.mistakes) == 1
 
 
+def test_places_in_place_of_names_are_told_where_they_are_declared():
+    scene = dap.Scene()
+    scene.add_body("a", mass=1.0, Jp=(1.0, 1.0, 1.0))
+    scene.add_joint("rev", P_i=(1, 0, 0), P_j="ground.O", a_i=(0, 0, 1), a_j="ground.z")
+    with pytest.raises(dap.SceneError) as caught:
+        check(scene, dap.load_registry())
+    assert [m.remedy for m in caught.value.mistakes] == [
+        "declare one, [points.NAME] with body and sPp, and give its name",
+        "declare one, [vectors.NAME] with body and sp, and give its name",
+    ]
+
+
 def test_functions_are_given_as_many_arguments_as_they_take():
     """A map over two arguments is no function of time, no spring curve and no term of a sum."""
     scene = scene_with(all=("sum", ["map", "swing"]))

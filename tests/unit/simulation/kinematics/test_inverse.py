@@ -183,6 +183,13 @@ def test_wrong_requests_are_refused(scene, motion, columns, actuators, words):
     assert words in str(caught.value)
 
 
+def test_a_motion_in_other_units_is_refused(scene, tmp_path):
+    path = tmp_path / "motion.csv"
+    path.write_text("t [s],crank.pitch [deg]\n" + "".join(f"{0.1 * k},{k}\n" for k in range(5)))
+    with pytest.raises(dap.SceneError, match=r"motion.crank.pitch: .* in deg, and it is in rad"):
+        dap.inverse(scene, path, "motor")
+
+
 def test_a_motion_that_leaves_a_freedom_open_is_refused(scene, motion):
     """The slider does not tell which way the crank turns at a dead centre."""
     with pytest.raises(dap.SimulationError, match=r"leaves 1 of 1 degrees.*give \w+\.angle as"):

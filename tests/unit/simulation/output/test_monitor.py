@@ -29,3 +29,20 @@ def test_it_goes_on_from_chunk_to_chunk():
     steps = np.diff([0, *(run.steps for run in seen)])
     spans = np.diff([0.0, *times])
     np.testing.assert_allclose([run.step for run in seen], spans / steps, rtol=1e-12)
+
+
+@long_in_plain_python
+def test_drift_is_measured_by_the_work_between_turning_points():
+    """A run with friction stops where the pendulum turns back, with its energy that of the start.
+    The limit is that of the tolerance, with a factor for some hundred steps."""
+    scene = dap.Scene()
+    scene.add_body("rod", mass=1.0, Jp=[0.1, 0.1, 0.1], r=[0.25, 0.0, 0.0])
+    scene.add_point("end", "rod", [-0.25, 0.0, 0.0])
+    scene.add_joint("rev", "hinge", P_i="end", P_j="ground.O", a_i="rod.y", a_j="ground.y")
+    scene.add_force("friction", joint="hinge", mu=0.1, radius=0.01)
+    scene.add_force("weight")
+    seen = []
+    result = dap.simulate(scene, t_end=3.0, watch=seen.append)
+    assert len(seen) > 3
+    assert max(run.drift for run in seen) < 1e-6
+    assert result.ledger["energy"].ok

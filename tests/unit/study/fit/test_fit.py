@@ -368,6 +368,27 @@ def test_what_is_refused(given, data, settings, words):
     assert words in mistakes_of(oscillator(), given, data, **settings)
 
 
+@pytest.mark.parametrize(
+    ("header", "words"),
+    [
+        ("t [s],mass.r.x [mm]", "the file has it in mm, and it is in m: convert the column"),
+        ("t [ms],mass.r.x", "times are in s, and not in ms"),
+        ("t;mass.r.x", "data.csv:1: measured: columns are between commas, not ';'"),
+        ("t,height", "give outputs={COLUMN: QUANTITY}"),
+        ("t [s],mass.rd.x [m/s²]", "in m/s², and it is in m/s: convert"),
+        ("t,mass.rdd.x [m / s²]", ""),
+    ],
+)
+def test_columns_of_a_file_in_other_units_are_refused(tmp_path, header, words):
+    """All spellings of the quantity's own unit are taken."""
+    path = tmp_path / "data.csv"
+    path.write_text(f"{header}\n0.0,0.1\n0.5,0.2\n")
+    if words:
+        assert words in mistakes_of(oscillator(), ["forces.spring.k"], path)
+    else:
+        dap.fit(oscillator(), ["forces.spring.k"], path)
+
+
 def test_mistakes_of_a_file_have_their_lines(tmp_path):
     path = tmp_path / "data.csv"
     path.write_text("t,mass.r.x\n0,1\n1,one\n2\n")
