@@ -125,9 +125,7 @@ def operating_point(
         return _point_at(compiled, evaluator, at, t)
 
 
-def _point_at(
-    compiled: CompiledModel, evaluator: Evaluator, at: Any, t: float
-) -> OperatingPoint:
+def _point_at(compiled: CompiledModel, evaluator: Evaluator, at: Any, t: float) -> OperatingPoint:
     """As ``operating_point``, of a compiled model and its evaluator."""
     model = compiled.model
     notes: list[str] = []
