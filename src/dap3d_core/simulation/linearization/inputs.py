@@ -274,7 +274,7 @@ WEIGHTS = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
 LOWER = np.array([0.0, 1.0, -8.0, 8.0, -1.0, 0.0]) / 12.0
 #: Both agree to this part of a smooth output, and to this part of its value over the step, which is
 #: rounding. Else steps are so much shorter, and tried so often.
-SMOOTH, ROUNDING, SHORTER, TRIES = 1e-8, 1e-12, 16.0, 8
+SMOOTH, VALUE_ROUNDING, SHORTER, TRIES = 1e-8, 1e-12, 16.0, 8
 #: Largest displacement of a body, as a part of the model's size or in rad, and of a velocity.
 STEP = 2e-3
 #: Least size of a state of an element, of which steps are parts.
@@ -331,7 +331,7 @@ def _along(
         takes = apart < missed[:, left]  # not of NaN
         found[:, left] = np.where(takes, slopes, found[:, left])
         missed[:, left] = np.where(takes, apart, missed[:, left])
-        limit = SMOOTH * np.abs(found[:, left]) + ROUNDING * np.abs(given) / steps[left]
+        limit = SMOOTH * np.abs(found[:, left]) + VALUE_ROUNDING * np.abs(given) / steps[left]
         left = left[~np.all(missed[:, left] <= limit, axis=0)]
         if not len(left):
             break
