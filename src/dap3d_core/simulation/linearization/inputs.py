@@ -323,7 +323,7 @@ def _along(
     found = np.full((len(names), len(directions)), np.nan)
     missed, left = np.full(found.shape, np.inf), np.arange(len(directions))
     for _ in range(TRIES):
-        rows = [_row(point, x * steps[k], directions[k]) for k in left for x in ABSCISSAE]
+        rows = [_row(point, x * steps[k], directions[k]) for k in left.tolist() for x in ABSCISSAE]
         values = _values(point, [*rows, _row(point, 0.0, rest)], names, factors)
         changes, given = values[:, :-1] - values[:, -1:], values[:, -1:]
         slopes, lower = (_slopes(changes, w) / steps[left] for w in (WEIGHTS, LOWER))
