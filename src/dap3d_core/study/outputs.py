@@ -273,8 +273,8 @@ class Reduction:
             return not self._moves_joints
         if quantity.owner == "joint" and quantity.kind != IN_ROWS:
             return self._tables <= {"forces"}
-        if quantity.owner == "force":
+        if quantity.owner in ("force", "contact"):
             return not self._tables
-        if quantity.owner == "point":
-            return "points" not in self._tables
+        if quantity.owner in ("point", "input"):
+            return f"{quantity.owner}s" not in self._tables
         return quantity.kind not in OF_MASSES or "bodies" not in self._tables

@@ -206,7 +206,7 @@ class Reference:
         change = adjoint(relative(here, moves.start))
         for part, (columns, motion) in enumerate(zip(moves.columns, group.motions, strict=True)):
             twist = moves.screws[:, columns]
-            if moves.parts[part].constant_in != group.child_slot:
+            if not _is_in_child(group, moves, part):
                 twist = np.einsum("kab,kdb->kda", change, twist)
             turn, shift = twist[..., 3:], twist[..., :3]
             if motion == node.PRISMATIC:
@@ -292,6 +292,20 @@ class Reference:
             return np.full((*v.shape[:-1], len(group.motions)), np.nan)
         twists = np.concatenate([v, w], axis=-1)
         return np.einsum("kab,...kb->...ka", np.linalg.pinv(columns), twists)
+
+
+def _is_in_child(group: MotionGroup, moves: JointMotions, part: int) -> bool:
+    """True if the axis of a part is fixed in the child, False if in the parent.
+
+    A rotation that follows translations across it goes along with them, and they do not turn with
+    it, whichever body its type names them in.
+    """
+    motions = group.motions
+    turns_last = motions[-1] == node.REVOLUTE
+    is_planar = motions.count(node.PRISMATIC) == len(motions) - 1 > 1
+    if is_planar and (turns_last or motions[0] == node.REVOLUTE):
+        return bool(turns_last == (motions[part] == node.REVOLUTE))
+    return bool(moves.parts[part].constant_in == group.child_slot)
 
 
 def inertias_about(s: Floats, mass: Floats, Jp: Floats) -> Floats:

@@ -71,9 +71,7 @@ def inputs_of(point: OperatingPoint, names: Sequence[str]) -> Inputs:
     notes: list[str] = []
     numbers: list[tuple[str, int] | None] = []
     drivers, read, last = [], [], []  # places of inputs with the rows that they move
-    with point.compiled.borrow_evaluator() as evaluator:
-        evaluator.states = point.states
-        evaluator.place(point.t, point.u)
+    with point.placed() as evaluator:
         for k, name in enumerate(names):
             element = name.partition(".")[0]
             if name in point.model.input_names:
@@ -270,9 +268,13 @@ def _columns(group: Group, name: str, field: str) -> tuple[str, list[int]]:
     raise UnknownNameError(f"input {name!r}: name {what}")
 
 
-#: Abscissae and weights of the sixth-order central difference.
+#: Abscissae and weights of the sixth-order central difference, and of that of fourth order.
 ABSCISSAE = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
 WEIGHTS = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
+LOWER = np.array([0.0, 1.0, -8.0, 8.0, -1.0, 0.0]) / 12.0
+#: Both agree to this part of a smooth output, and to this part of its value over the step, which is
+#: rounding. Else steps are so much shorter, and tried so often.
+SMOOTH, VALUE_ROUNDING, SHORTER, TRIES = 1e-8, 1e-12, 16.0, 8
 #: Largest displacement of a body, as a part of the model's size or in rad, and of a velocity.
 STEP = 2e-3
 #: Least size of a state of an element, of which steps are parts.
@@ -300,24 +302,46 @@ def output_derivatives(
         a_change = space.acceleration_by_force @ wrench + space.acceleration_by_driver @ driver
         lam_change = space.multipliers_by_force @ wrench + space.multipliers_by_driver @ driver
         directions.append((none, none, a_change, lam_change, unmoved))
-    steps = [_step(point, *direction) for direction in directions]
-    rows = [
-        _row(point, x * h, direction)
-        for h, direction in zip(steps, directions, strict=True)
-        for x in ABSCISSAE
-    ]
     rest = (none, none, none, np.zeros_like(point.tangent.multipliers), unmoved)
-    values = _values(point, [*rows, _row(point, 0.0, rest)], names, inputs.factors)
-    matrix = _slopes(values[:, :-1] - values[:, -1:]) / steps
+    matrix = _along(point, directions, rest, names, inputs.factors)
     for k, number in enumerate(inputs.numbers):
         if number is not None:
-            matrix[:, states + k] += _by_number(point, *number, rest, names, values[:, -1:])
+            matrix[:, states + k] += _by_number(point, *number, rest, names)
     return matrix[:, :states], matrix[:, states:]
 
 
-def _slopes(values: Floats) -> Floats:
+def _along(
+    point: OperatingPoint, directions: Sequence[Any], rest: Any, names: Sequence[str],
+    factors: frozenset[str],
+) -> Floats:  # fmt: skip
+    """(outputs, directions) derivatives of quantities along directions; ``rest`` leads nowhere.
+
+    A step that is short for bodies may turn a reaction, of which an output is the norm, around:
+    where differences of two orders are apart, shorter ones are taken.
+    """
+    steps = np.array([_step(point, *direction) for direction in directions])
+    found = np.full((len(names), len(directions)), np.nan)
+    missed, left = np.full(found.shape, np.inf), np.arange(len(directions))
+    for _ in range(TRIES):
+        rows = [_row(point, x * steps[k], directions[k]) for k in left.tolist() for x in ABSCISSAE]
+        values = _values(point, [*rows, _row(point, 0.0, rest)], names, factors)
+        changes, given = values[:, :-1] - values[:, -1:], values[:, -1:]
+        slopes, lower = (_slopes(changes, w) / steps[left] for w in (WEIGHTS, LOWER))
+        apart = np.abs(slopes - lower)
+        takes = apart < missed[:, left]  # not of NaN
+        found[:, left] = np.where(takes, slopes, found[:, left])
+        missed[:, left] = np.where(takes, apart, missed[:, left])
+        limit = SMOOTH * np.abs(found[:, left]) + VALUE_ROUNDING * np.abs(given) / steps[left]
+        left = left[~np.all(missed[:, left] <= limit, axis=0)]
+        if not len(left):
+            break
+        steps /= SHORTER
+    return found
+
+
+def _slopes(values: Floats, weights: Floats = WEIGHTS) -> Floats:
     """(outputs, d) differences of values (outputs, abscissae of d directions), of unit steps."""
-    return values.reshape(len(values), -1, len(ABSCISSAE)) @ WEIGHTS
+    return values.reshape(len(values), -1, len(ABSCISSAE)) @ weights
 
 
 def _values(
@@ -366,22 +390,23 @@ def _factor_in(model: Model, result: Result, name: str, factors: frozenset[str])
 
 
 def _by_number(
-    point: OperatingPoint, array: str, place: int, rest: Any, names: Sequence[str], given: Floats
+    point: OperatingPoint, array: str, place: int, rest: Any, names: Sequence[str]
 ) -> Floats:
-    """(outputs,) derivatives of quantities, (outputs, 1) as given, by a number that elements read,
-    in a state and motion that stay.
+    """(outputs,) derivatives of quantities by a number that elements read, in a state and motion
+    that stay.
     """
     numbers = getattr(point.evaluator.system, array).reshape(-1)
     number = float(numbers[place])
     h = STEP * (abs(number) or 1.0)
     columns = []
     try:
-        for x in ABSCISSAE:
+        for x in (*ABSCISSAE, 0.0):
             numbers[place] = number + x * h
             columns.append(_values(point, [_row(point, 0.0, rest)], names, frozenset()))
     finally:
         numbers[place] = number
-    return _slopes(np.hstack(columns) - given)[:, 0] / h
+    values = np.hstack(columns)
+    return _slopes(values[:, :-1] - values[:, -1:])[:, 0] / h
 
 
 def _step(point: OperatingPoint, *direction: Floats) -> float:

@@ -101,7 +101,9 @@ class Linearization:
 
     @cached_property
     def _outputs(self) -> tuple[Floats, Floats]:
-        return output_derivatives(self._point, self._space, self._inputs, self.outputs)
+        point, space = self._point, self._space
+        with point.placed():
+            return output_derivatives(point, space, self._inputs, self.outputs)
 
     @property
     def A(self) -> Floats:

@@ -53,8 +53,7 @@ def mode_motion(
                MOST_TURN / turn if turn > 0.0 else np.inf]  # fmt: skip
     amplitude = min(factors)
     rows = []
-    with point.compiled.borrow_evaluator() as evaluator:
-        evaluator.states = point.states
+    with point.placed() as evaluator:
         for t in np.linspace(0.0, period, instants):
             phase = np.exp(2j * np.pi * t / period)
             velocity = amplitude * np.real(shape * phase * 2j * np.pi / period)

@@ -1,6 +1,8 @@
 """The state about which a scene is linearised, checked for what linearisation needs."""
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from typing import Any
 
@@ -50,6 +52,7 @@ class OperatingPoint:
         t: time, s.
         u: (13 n,) the state, on the constraints.
         states: (s,) states of elements.
+        turns: (angles,) with counted turns, where they are known; inputs: (inputs,) their values.
         tangent: derivatives of the equations of motion.
         frames: axes in which the equations are written.
         notes: choices and warnings.
@@ -60,6 +63,8 @@ class OperatingPoint:
     t: float
     u: Floats
     states: Floats
+    turns: Floats | None
+    inputs: Floats
     tangent: TangentMatrices
     frames: SteadyFrames
     notes: tuple[str, ...]
@@ -74,6 +79,15 @@ class OperatingPoint:
     def evaluator(self) -> Evaluator:
         """The evaluator of the calling thread."""
         return self.compiled.evaluator
+
+    @contextmanager
+    def placed(self) -> Iterator[Evaluator]:
+        """``evaluator`` in this state, whatever was computed with it since."""
+        with self.compiled.borrow_evaluator() as evaluator, evaluator.held_inputs():
+            evaluator.set_inputs(self.inputs)
+            evaluator.start(self.t, self.u, self.turns, self.states)
+            evaluator.place(self.t, self.u)
+            yield evaluator
 
     @cached_property
     def equations(self) -> ScaledEquations:
@@ -95,7 +109,8 @@ class OperatingPoint:
         position = self.model.position_row
         if np.all(position):
             return self.rank.rank
-        rows, _ = scaled_rows(self.evaluator.rows(self.t, self.u), self.model.length)
+        with self.placed() as evaluator:
+            rows, _ = scaled_rows(evaluator.rows(self.t, self.u), self.model.length)
         return dense_rank(rows.dense()[position], fit_of(self.model)).rank
 
 
@@ -105,26 +120,31 @@ def operating_point(
     """The state to linearise about; arguments and errors as of ``linearize``."""
     t = time_of(t)
     compiled = compile_exact(scene, allow_code)
+    refuse_collisions(compiled.model, "linearisation")
+    with compiled.borrow_evaluator() as evaluator, evaluator.held_inputs():
+        return _point_at(compiled, evaluator, at, t)
+
+
+def _point_at(compiled: CompiledModel, evaluator: Evaluator, at: Any, t: float) -> OperatingPoint:
+    """As ``operating_point``, of a compiled model and its evaluator."""
     model = compiled.model
-    refuse_collisions(model, "linearisation")
     notes: list[str] = []
-    with compiled.borrow_evaluator() as evaluator:
-        u, turns, states = _state(compiled, at, t, notes)
-        evaluator.start(t, u, turns, states)
-        _refuse_unknown_modes(evaluator, t, u, states)
-        _check(evaluator, t, u)
-        redundancy = redundancy_of(evaluator, u, t)
-        if redundancy.singular is not None:
-            notes.append(
-                "the pose is singular: constraint rows lose rank here, and freedoms that exist at "
-                "this pose alone count as freedoms; linearise about a pose nearby"
-            )
-        tangent = tangent_matrices(evaluator, t, u)
-        rank = redundancy.rank
-        if model.contact_count:
-            every = scaled_rows(evaluator.rows(t, u), model.length)[0].dense()
-            rank = dense_rank(every, fit_of(model))
-        frames = steady_frames(model, tangent, u, rank.dependencies)
+    u, turns, states = _state(compiled, at, t, notes)
+    evaluator.start(t, u, turns, states)
+    _refuse_unknown_modes(evaluator, t, u, states)
+    _check(evaluator, t, u)
+    redundancy = redundancy_of(evaluator, u, t)
+    if redundancy.singular is not None:
+        notes.append(
+            "the pose is singular: constraint rows lose rank here, and freedoms that exist at "
+            "this pose alone count as freedoms; linearise about a pose nearby"
+        )
+    tangent = tangent_matrices(evaluator, t, u)
+    rank = redundancy.rank
+    if model.contact_count:
+        every = scaled_rows(evaluator.rows(t, u), model.length)[0].dense()
+        rank = dense_rank(every, fit_of(model))
+    frames = steady_frames(model, tangent, u, rank.dependencies)
     if not (frames.is_steady and _keeps_states(model, tangent, evaluator.states)):
         frames = attrs.evolve(frames, is_steady=False)
         notes.append(
@@ -152,7 +172,10 @@ def operating_point(
             "joints with friction: linearised with the smooth law of friction at this state, "
             "which at rest is a strong damper and no stiction"
         )
-    return OperatingPoint(compiled, t, u, evaluator.states, tangent, frames, tuple(notes), rank)
+    return OperatingPoint(
+        compiled, t, u, evaluator.states, turns, evaluator.inputs, tangent, frames, tuple(notes),
+        rank,
+    )  # fmt: skip
 
 
 def _refuse_unknown_modes(evaluator: Evaluator, t: float, u: Floats, states: Floats | None) -> None:

@@ -16,6 +16,7 @@ from dap3d_core.assembly.arrays import EVEN, LENGTH, WEAK
 from dap3d_core.formulations.coordinates import UnsuitableError
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators.stepping.integration_state import BEFORE, INSTANT
+from dap3d_core.interface.fields import specs_of
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.array_struct import Arrays
 from dap3d_core.scene import Mistake, SceneError
@@ -214,6 +215,11 @@ def _made(
             except (SceneError, SimulationError, UnsuitableError, ValueError) as error:
                 why = " ".join(str(error).split())
                 continue
+            if any(_whole_numbers(run) != _whole_numbers(base) for run in runs):
+                raise SimulationError(
+                    f"there is no derivative by {parameter.name} at {value:g}: whole numbers, such "
+                    "as counts of teeth, follow from it, and jump"
+                )
             if any(not _are_alike(base, run) for run in runs):
                 why = "the model has another structure there"
                 continue
@@ -274,6 +280,16 @@ def _scales(evaluator: Evaluator) -> Floats:
     units = [group.number("unit_mass") for group in evaluator.model.contacts]
     own = evaluator.system.settings[[LENGTH, EVEN, WEAK]]
     return np.concatenate([own, [evaluator.time], *units])
+
+
+def _whole_numbers(run: Run) -> list[list[float]]:
+    """Those of elements, such as the counts of teeth that stand for two radii."""
+    return [
+        group.number(name).tolist()
+        for group in run.evaluator.model.acting
+        for name, spec in specs_of(group.type_info.type).items()
+        if spec.whole
+    ]
 
 
 def _vectors(run: Run) -> Floats:

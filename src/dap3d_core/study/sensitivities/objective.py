@@ -21,7 +21,7 @@ from dap3d_core.simulation import CompiledModel, simulate
 from dap3d_core.simulation.output.check_outputs import probe_of
 from dap3d_core.study.outputs import REDUCTIONS, unknown_quantity
 from dap3d_core.study.parameters import with_values
-from dap3d_core.study.sensitivities.sensitivities import parameters_by, sensitivities
+from dap3d_core.study.sensitivities.sensitivities import parameters_by, sensitivities, take_varied
 
 #: Arguments of ``sensitivities`` that are no settings.
 OWN = ("scene", "by", "allow_code", "announce")
@@ -53,6 +53,7 @@ class Objective:
             SceneError: an unknown parameter or quantity, with the nearest.
         """
         self._scene, self._settings = scene.copy(), settings
+        take_varied(self._scene, by, settings)
         quantity, colon, number = of.rpartition(":")
         quantity, number = (quantity, number.strip()) if colon else (of, "final")
         if number not in NUMBERS:

@@ -230,9 +230,14 @@ def sensitivities(
     """
     compiled = compiled_for(scene, allow_code, announce, **settings)
     refuse_collisions(compiled.model, "a run with derivatives")
-    parameters = parameters_by(compiled.checked, [by] if isinstance(by, str) else list(by))
+    names, given = [by] if isinstance(by, str) else list(by), dict[str, Any](settings)
+    own = compiled.scene.copy()
+    if take_varied(own, names, given):
+        compiled = CompiledModel(own, method=compiled.requested_method,
+                                 registry=compiled.checked.registry, like=compiled)  # fmt: skip
+    parameters = parameters_by(compiled.checked, names)
     check_differentiable(parameters, "by")
-    given: dict[str, Any] = {**settings, "start": start_word(start)}
+    given["start"] = start_word(start)
     method = given.pop("method", None)
     state = given_state(start, compiled)
     base = run_beside(compiled, given, (), state)
@@ -249,6 +254,19 @@ def sensitivities(
     for note in _notes(compiled, runs, results[0]):
         results[0].note(note)
     return Sensitivities(results[0], runs, parameters)
+
+
+def take_varied(scene: Scene, names: Sequence[str], settings: dict[str, Any]) -> bool:
+    """Move settings that are given and vary, such as ``simulation.t_end``, into a scene.
+
+    Returns:
+        True if there are some.
+    """
+    varied = [name for name, value in settings.items() if value is not None
+              and f"simulation.{name}" in names]  # fmt: skip
+    for name in varied:
+        setattr(scene.simulation, name, settings.pop(name))
+    return bool(varied)
 
 
 def check_differentiable(parameters: Sequence[SceneParameter], key: str) -> None:

@@ -90,3 +90,58 @@ def test_the_cost_is_known_without_a_run_by_method_joint():
     )  # fmt: skip
     assert 0.2 < module.cost_over_standard(chain.model, chain.evaluator.plan) < 0.6
     assert module.cost_over_standard(net.model, net.evaluator.plan) > 1.2
+
+
+#: Fields of joints of a plate, as body i, on ground.
+JOINTS = {
+    "rev": {"a_i": "plate.y", "a_j": "ground.y"},
+    "cyl": {"a_i": "plate.y", "a_j": "ground.y"},
+    "planar": {"a_i": "plate.y", "a_j": "ground.y"},
+    "tran": {"a_j": "ground.y"},
+    "univ": {"a_i": "plate.x", "n_j": "ground.y"},
+}
+
+
+def on_ground(type_, *, is_reversed):
+    """A plate on ground; reversed, the plate is body j."""
+    scene = dap.Scene(name="plate")
+    scene.add_body("plate", mass=3.0, Jp=(0.1, 0.2, 0.3))
+    fields = {"P_i": "plate.O", "P_j": "ground.O", **JOINTS[type_]}
+    if is_reversed:
+        other = {"plate": "ground", "ground": "plate"}
+        parts = {field: value.split(".") for field, value in fields.items()}
+        fields = {field: f"{other[body]}.{what}" for field, (body, what) in parts.items()}
+    scene.add_joint(type_, "joint", **fields)
+    return scene
+
+
+@pytest.mark.parametrize("is_reversed", [False, True])
+@pytest.mark.parametrize("type_", JOINTS)
+def test_rates_are_those_of_the_velocities_of_bodies_in_every_pose(type_, is_reversed):
+    """Velocities that jump by nothing leave rates as they are, where joints have moved on."""
+    compiled = CompiledModel(on_ground(type_, is_reversed=is_reversed), method="joint")
+    coordinates = compiled.evaluator.coordinates
+    y = coordinates.start(compiled.model.u0)
+    layout = coordinates.nodes.layout
+    for name in ("angles", "lengths"):
+        y[layout[name]] += 0.4 + 0.3 * np.arange(layout.length(name))
+    for name in ("angle_rates", "length_rates"):
+        y[layout[name]] = 0.7 - 0.5 * np.arange(layout.length(name))
+    jumped = coordinates.with_jump(y, np.zeros(6), compiled.evaluator.states, 0.0)
+    np.testing.assert_allclose(jumped, y, atol=1e-14)
+
+
+@pytest.mark.parametrize("is_reversed", [False, True])
+def test_a_plate_in_a_plane_is_hit_as_by_other_methods(is_reversed):
+    scene = on_ground("planar", is_reversed=is_reversed)
+    scene.bodies["plate"].w = (0.0, 3.0, 0.0)
+    scene.bodies["plate"].r_dot = (0.3, 0.0, 0.1)
+    scene.add_body("ball", mass=0.5, Jp=(0.002, 0.002, 0.002), r=(0.3, 0.02, 0.2),
+                   r_dot=(0.1, 0.1, -2.0))  # fmt: skip
+    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.06, P_j="plate.O",
+                      a_j="plate.z", e=0.5, mu=0.3)  # fmt: skip
+    ways = [dap.simulate(scene, t_end=0.3, dt=0.3, method=m, rtol=1e-10, atol=1e-12)
+            for m in ("lsq", "joint")]  # fmt: skip
+    assert ways[1].ledger["energy"].ok
+    assert ways[0].events
+    np.testing.assert_allclose(ways[1].u[-1], ways[0].u[-1], atol=1e-8)

@@ -100,6 +100,29 @@ def test_outputs_that_read_inputs():
 
 
 @long_in_plain_python
+def test_norms_of_forces_that_a_step_would_turn_around():
+    """A stiff spring holds 9.81 N: a newton less for a newton of lift, at any stiffness."""
+    scene = dap.Scene(name="hung")
+    scene.add_body("mass", mass=1.0, Jp=(0.1, 0.1, 0.1))
+    scene.add_point("hook", "ground", (0.0, 0.0, 0.5))
+    scene.add_joint("tran", "guide", P_i="mass.O", P_j="ground.O", a_j="ground.z")
+    scene.add_force("ptp", "wire", P_i="mass.O", P_j="hook", k=1e8, l0=0.5)
+    scene.add_force("f", "lift", body_i="mass", f=(0.3, 0.0, 0.0))
+    scene.add_force("weight", "gravity", gravity=9.81)
+    scene.add_output("load", "norm(wire.force)")
+    scene.add_output("side", "norm(guide.force)")
+    at = dap.equilibrium(scene)
+    lin = dap.linearize(scene, at=at, inputs=("lift.f.x", "lift.f.z"),
+                        outputs=("load", "side", "wire.tension", "mass.r.z"))  # fmt: skip
+    load, side, tension, height = lin.C
+    # differences of a force of 9.81 N that 1e8 N/m holds: rounding of 1e-16 m over 1e-7 m
+    np.testing.assert_allclose(load, tension, rtol=1e-6)
+    np.testing.assert_allclose(tension[0], -1e8 * height[0], rtol=1e-9)
+    np.testing.assert_allclose(side, 0.0, atol=1e-3)
+    # the guide holds what is across it: 0.3 N
+    np.testing.assert_allclose(lin.D[1], [1.0, 0.0], atol=1e-9)
+
+
 def test_state_space_follows_the_motion():
     """After a small kick the simulated motion is that of z_dot = A z."""
     kick = 1e-5
@@ -138,6 +161,31 @@ def test_numbers_that_an_event_has_changed():
     stiff = dap.linearize(scene, at=run, t=0.5)
     # det M^-1 K, in any basis: that of two freedoms is chosen by rounding
     assert np.linalg.det(stiff.A) / np.linalg.det(soft.A) == pytest.approx(4.0, rel=1e-9)
+
+
+def pushed():
+    """A carriage on a spring, with a force whose factor is an input, and a run that sets it."""
+    scene = dap.Scene(name="pushed")
+    scene.add_input("push", 0.5)
+    scene.add_body("mass", mass=2.0, Jp=(1.0, 1.0, 1.0), r=(1.0, 0.0, 0.0))
+    scene.add_force("ptp", "spring", P_i="mass.O", P_j="ground.O", k=8.0, l0=1.0)
+    scene.add_force("f", "pull", body_i="mass", f=(1.0, 0.0, 0.0), input="push")
+    to_three = dap.Controller(every=0.1, update=lambda t, state: {"push": 3.0})
+    return scene, dap.simulate(scene, t_end=0.4, dt=0.2, controllers=[to_three])
+
+
+def test_inputs_of_a_result_are_those_of_its_equations_alone():
+    """B of the field f is push / m; the model has its own inputs before and afterwards."""
+    scene, result = pushed()
+    model = dap.compile(scene)
+    before = model.rhs(0.0, result.u[1])
+    then = dap.linearize(model, at=result, t=0.2)
+    assert (model.rhs(0.0, result.u[1]) == before).all()
+    own = dap.linearize(model, at=result.u[1])
+    for lin, push in ((then, 3.0), (own, 0.5)):  # in which order is all the same
+        response = lin.frequency_response(1.0, inputs="pull.f.x", outputs="mass.rdd.x")[0, 0, 0]
+        free = dap.linearize(scene, at=result.u[1]).frequency_response(1.0, "push", "mass.rdd.x")
+        assert response == pytest.approx(push * free[0, 0, 0], rel=1e-9)
 
 
 def test_counted_turns_of_a_result():

@@ -40,6 +40,14 @@ def test_gradients_are_those_of_differences(number):
     assert (f.runs, f.gradients) == (5, 1)
 
 
+def test_a_setting_that_is_given_and_varies():
+    f = dap.objective(oscillator(), "simulation.t_end", "mass.r.x:integral", t_end=1.0, dt=0.02)
+    assert f.x0 == 1.0
+    end = dap.simulate(oscillator(), t_end=0.63).quantity("mass.r.x").values[-1]
+    assert f.gradient([0.63])[0] == pytest.approx(end, rel=2e-3)  # of the trapezoidal rule
+    assert f([0.63]) < f([1.0])
+
+
 def test_an_optimum_that_is_known():
     """The throw that goes 2 m in 1 s: speed 2 m/s."""
     scene = dap.Scene(name="stone")

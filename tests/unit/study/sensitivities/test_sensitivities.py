@@ -253,6 +253,44 @@ def test_the_end_of_a_run():
     assert s.final("cylinder.r.z")[0] == pytest.approx(speed, rel=1e-9)
 
 
+def test_an_end_that_is_given_is_the_one_that_varies():
+    s = dap.sensitivities("pen2", "simulation.t_end", t_end=0.3)
+    assert s.values == s.result.t[-1] == 0.3
+    speed = s.result.quantity("cylinder.rd.z").values[-1]
+    assert s.final("cylinder.r.z")[0] == pytest.approx(speed, rel=1e-9)
+
+
+def test_quantities_that_read_a_parameter_by_themselves():
+    """Gaps of contacts fall with the radius of a ball that flies, inputs are themselves."""
+    scene = dap.Scene(name="ball")
+    scene.add_input("push", 0.5)
+    scene.add_body("ball", mass=2.0, Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 2.0))
+    scene.add_force("f", "wind", body_i="ball", f=(1.0, 0.0, 0.0), input="push")
+    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.25)
+    scene.add_output("both", "ball.r.z - 2 * floor.gap + push * ball.rd.x")
+    s = dap.sensitivities(scene, ["contacts.floor.radius", "inputs.push.value"], **SHORT)
+    t = s.result.t
+    np.testing.assert_allclose(s.of("floor.gap"), [[-1.0, 0.0]] * len(t), rtol=1e-12)
+    np.testing.assert_allclose(s.of("push"), [[0.0, 1.0]] * len(t), rtol=1e-12, atol=1e-13)
+    by_push = 2.0 * 0.5 * t / 2.0  # push rd with rd = push t / m
+    np.testing.assert_allclose(s.of("both")[:, 0], 2.0, rtol=1e-12)
+    np.testing.assert_allclose(s.of("both")[:, 1], by_push, rtol=1e-10, atol=1e-12)
+
+
+def test_radii_that_stand_for_teeth_have_no_derivative():
+    scene = dap.Scene(name="gears")
+    for name, x in (("small", 0.0), ("large", 0.3)):
+        scene.add_body(name, mass=1.0, Jp=(1.0, 1.0, 1.0), r=(x, 0.0, 0.0))
+        scene.add_point(f"axle_{name}", "ground", (x, 0.0, 0.0))
+        scene.add_joint("rev", f"on_{name}", P_i=f"{name}.O", P_j=f"axle_{name}",
+                        a_i=f"{name}.z", a_j="ground.z")  # fmt: skip
+    radii = {"radius_i": 0.1, "radius_j": 0.2}
+    scene.add_joint("gear", "mesh", joint_i="on_small", joint_j="on_large", **radii)
+    with pytest.raises(dap.SimulationError, match="counts of teeth"):
+        dap.sensitivities(scene, "joints.mesh.radius_i", **SHORT)
+    dap.sensitivities(scene, "bodies.small.Jp.z", **SHORT)
+
+
 def test_corrected_starts_are_exact():
     """The lever lies in the plane of a mechanism, across which it changes in second order alone."""
     by = "points.lever.sPp.z"
