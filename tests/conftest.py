@@ -4,6 +4,7 @@ import gc
 import os
 import signal
 from collections import defaultdict
+from inspect import isfunction
 from math import ceil
 from zlib import crc32
 
@@ -59,6 +60,14 @@ def keep_unoptimised():
 
     units.Unit._compile, objects.optimised = compile_once, compile_program
     background.optimiser.add = lambda unit: None
+
+
+def pytest_pycollect_makeitem(collector, obj):
+    """Make no items of slow tests that are left out: their thousands of cases take seconds."""
+    if collector.config.option.markexpr != "not slow" or not isfunction(obj):
+        return None
+    marks = (*getattr(obj, "pytestmark", ()), *collector.iter_markers())
+    return [] if any(mark.name == "slow" for mark in marks) else None
 
 
 def _families(items):

@@ -30,13 +30,17 @@ def known(scene, parameter, values, **_):
 
 
 @pytest.fixture
-def model(tmp_path, monkeypatch):
-    """The pendulum in the current folder."""
+def words(tmp_path, monkeypatch):
+    """A command for the pendulum in the current folder."""
     monkeypatch.chdir(tmp_path)
-    path_of_pendulum()
-    monkeypatch.setattr(dap, "equilibrium_path", known)
     pendulum().save("pendulum.toml")
-    return ["equilibrium", "pendulum.toml", "--over", "parameters.torque=0:12:4"]
+    return ["equilibrium", "pendulum.toml"]
+
+
+@pytest.fixture
+def model(words, monkeypatch):
+    monkeypatch.setattr(dap, "equilibrium_path", known)
+    return [*words, "--over", "parameters.torque=0:12:4"]
 
 
 @pytest.mark.slow
@@ -77,7 +81,7 @@ def test_path_that_ends_on_its_way(tmp_path, capsys, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("more", "said"),
     [
         (("--of", "bab.r.z"), "did you mean 'bob.r.z'"),
         (("-o", "path.toml"), ".png"),
@@ -86,9 +90,10 @@ def test_path_that_ends_on_its_way(tmp_path, capsys, monkeypatch):
         (("-o", "curve.png"), "give --over PARAMETER=FROM:TO:N"),
     ],
 )
-def test_what_is_refused(model, words, said, capsys, tmp_path):
+def test_what_is_refused(words, more, said, capsys, tmp_path):
     """One message, exit status 2."""
-    first = model[:2] if "--over" in words or "curve.png" in words else model
-    assert main([*first, *words]) == 2
+    if "--over" not in more and "curve.png" not in more:
+        words += ["--over", "parameters.torque=0:1:2"]
+    assert main([*words, *more]) == 2
     assert said in " ".join(capsys.readouterr().err.split())
     assert not (tmp_path / "curve.png").exists()
