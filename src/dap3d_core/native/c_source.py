@@ -204,6 +204,7 @@ def _numbers(prepared: PreparedRun, variables: Sequence[Variable]) -> list[str]:
         "BODIES": image.at(system.body),
         "VALUES": image.at(system.F),
         "BODY_COUNT": prepared.evaluator.model.body_count,
+        "ELEMENT_STATES": len(prepared.evaluator.model.initial_states),
         "BODY_WIDTH": BODY_WIDTH,
         "BODY_V": V,
         "BODY_W": W,
@@ -358,7 +359,7 @@ def _jumps(prepared: PreparedRun) -> list[str]:
 def _contacts(law: ContactCode, place: Callable[[Any], int]) -> list[str]:
     """The same of contacts that events follow."""
     s = law.arguments[0]
-    names = ("y", "integer", "limit", "length", "arm", "ended", "switches")
+    names = ("y", "integer", "limit", "length", "arm", "ended", "switches", "state")
     numbers: dict[str, Any] = {"JUMPS": 0, "CONTACTS": len(law.names)}
     numbers |= {name: getattr(contact_jumps, name) for name in LIMITS}
     numbers |= {f"CONTACT_{name.upper()}": place(getattr(s, name)) for name in names}
@@ -473,7 +474,6 @@ def _start(prepared: PreparedRun, variables: Sequence[Variable]) -> list[str]:
         "BEGIN": place(start.functions),
         "METRIC": place(system.metric),
         "METRIC_WIDTH": METRIC_WIDTH,
-        "ELEMENT_STATES": len(prepared.evaluator.model.initial_states),
         **mass_numbers(prepared),
     }
     lines = _defined(numbers)

@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 import attrs
 import numpy as np
 import pytest
+from support.bouncing import bouncing
 from support.internals import contact_jumps, placed_shapes
 from support.own_types import registry_of
 from verification.test_rolling_resistance import Wheel, scene_on_wheel
@@ -376,6 +377,53 @@ def test_steps_go_on_from_a_state_that_is_set_behind_the_end(tmp_path):
     assert not library.functions.dap3d_set_states(run._model, 0.0, start.ctypes.data)
     assert run.step_to(0.2)
     assert np.array_equal(run.values(states), expected)
+
+
+def test_rates_before_a_run_begins_are_those_of_the_mass_that_was_set(tmp_path):
+    _, library = exported(dap.load("pen1"), tmp_path, parameters=["bodies.cone.mass"])
+    states = [name for name, kind in library.kinds.items() if kind == "state"]
+    y = library.start(1.0).values(states)
+    run = library.start(1.0)
+    run["bodies.cone.mass"] *= 1.5
+    before = run.derivatives(0.0, y)
+    run.values(states)  # which begins the run
+    assert np.array_equal(before, run.derivatives(0.0, y))
+
+
+def test_a_run_that_fails_is_where_it_stopped(tmp_path):
+    _, library = exported(dap.load("A05"), tmp_path, integrator="rk4", step=1e-3)
+    states = [name for name, kind in library.kinds.items() if kind == "state"]
+    run, other = library.start(1.0), library.start(1.0)
+    with pytest.raises(dap.SimulationError, match=r"stopped at t = 0\.004 s"):
+        run.step_to(1.0)
+    assert run.t == pytest.approx(3e-3, rel=1e-12)  # the last step that has an end
+    other.step_to(run.t)
+    assert np.array_equal(run.values(states), other.values(states))
+
+
+@pytest.mark.slow
+def test_contacts_begin_anew_where_states_are_set(tmp_path, monkeypatch):
+    """A limit of 6 bounces within 0.5 s, where a course has one in 1 s, and the seventh at 3 s."""
+    monkeypatch.setattr(contact_jumps, "MOST_CHANGES", 6)
+    monkeypatch.setattr(contact_jumps, "WITHIN", 0.05)
+    _, library = exported(bouncing_contact(), tmp_path)
+    states = [name for name, kind in library.kinds.items() if kind == "state"]
+    run = library.start(10.0)
+    start = run.values(states)
+    for _ in range(8):  # bounces of courses before do not count
+        assert run.step_to(0.6)
+        assert not library.functions.dap3d_set_states(run._model, 0.0, start.ctypes.data)
+    with pytest.raises(dap.SimulationError, match="change ever faster"):
+        run.step_to(9.0)
+    assert not library.functions.dap3d_set_states(run._model, 0.0, start.ctypes.data)
+    assert run.step_to(0.6)  # through a bounce at 0.45 s
+
+
+def bouncing_contact():
+    scene = bouncing()
+    del scene.forces["floor"]
+    scene.add_contact("ball_plane", "floor", P_i="ball.O", e=0.8)
+    return scene
 
 
 @pytest.mark.slow

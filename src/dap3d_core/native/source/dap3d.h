@@ -108,7 +108,8 @@ DAP3D_API int dap3d_get_all(dap3d_model *model, const int *variables, int count,
 /* The present time, in seconds. */
 DAP3D_API double dap3d_time(const dap3d_model *model);
 
-/* Go on to a later time. DAP3D_ENDED if the model ends the run before, at dap3d_time(model). */
+/* Go on to a later time. DAP3D_ENDED if the model ends the run before, at dap3d_time(model), which
+   is also where a run that fails has stopped. */
 DAP3D_API int dap3d_step_to(dap3d_model *model, double t);
 
 /* ---------------------------------------------------------------------- states of a run */
@@ -136,7 +137,8 @@ DAP3D_API int dap3d_state_count(void);
 /* The states at the present time. */
 DAP3D_API int dap3d_states(const dap3d_model *model, double *y);
 
-/* Make t and y the present time and state; steps continue from there. */
+/* Make t and y the present time and state; steps continue from there. Modes of contacts are states
+   as well: of a body that is lifted off what it touched, give the mode 0. */
 DAP3D_API int dap3d_set_states(dap3d_model *model, double t, const double *y);
 
 /* Their derivatives at t and y. DAP3D_ERROR if they are not finite; DAP3D_INVALID where contacts are

@@ -95,6 +95,8 @@ static fmi_status fmi_setup(fmu *f, double start, bool has_stop, double stop)
     for (int k = 0; k < INTEGRATIONS; k++)
         numbers(f->model, integrations[k].times)[2] = f->model->t_end;
     set_stops(f->model);
+    if (!f->model->is_under_way) /* what was read or set before began a run of another end */
+        begin_with(f->model, 0, 0.0);
     return fmi_ok;
 }
 
@@ -207,6 +209,15 @@ FMI_API void FMI(FreeInstance)(I instance)
 FMI_API S FMI(ExitInitializationMode)(I instance)
 {
     start(F->model);
+    if (F->model->is_under_way && !F->is_initialised) { /* states have been set: it begins there */
+#if CONTACTS
+        double *states = y_of(F->model) + STATES - 1 - ELEMENT_STATES;
+        for (int c = 0; c < CONTACTS; c++)
+            states[F->model->w[CONTACT_STATE + c]] = 0.0; /* open */
+#endif
+        jump_at_start(F->model);
+        F->model->has_row = 0;
+    }
     if (integer_of(F->model)[I_status] > FINISHED)
         return stopped(F->model), fmi_failed(F, fmi_error, dap3d_message(F->model));
     F->model->is_under_way = 1;

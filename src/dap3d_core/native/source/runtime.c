@@ -718,20 +718,10 @@ static int find_start(dap3d_model *m)
 }
 #endif
 
-/* Find the start, and let what touches and approaches jump there, once. */
-static void start(dap3d_model *m)
+/* Let what touches and approaches at the start jump there. */
+static void jump_at_start(dap3d_model *m)
 {
-    if (m->has_begun)
-        return;
-    m->has_begun = 1;
-#if FIXED
-    int status = m->is_other ? find_start(m) : RUNNING;
-    if (status != RUNNING) {
-        integer_of(m)[I_status] = status;
-        real_of(m)[R_t_stop] = 0.0;
-        return;
-    }
-#endif
+    (void)m;
 #if JUMPS
     double none[SWITCHES + 1] = {0.0};
     int acted;
@@ -746,6 +736,23 @@ static void start(dap3d_model *m)
         real_of(m)[R_t_stop] = real_of(m)[R_t];
     }
 #endif
+}
+
+/* Find the start, and let what touches and approaches jump there, once. */
+static void start(dap3d_model *m)
+{
+    if (m->has_begun)
+        return;
+    m->has_begun = 1;
+#if FIXED
+    int status = m->is_other ? find_start(m) : RUNNING;
+    if (status != RUNNING) {
+        integer_of(m)[I_status] = status;
+        real_of(m)[R_t_stop] = 0.0;
+        return;
+    }
+#endif
+    jump_at_start(m);
 }
 
 /* As Jumps.apply, where an integration has stopped for it; whether it goes on. */
@@ -824,6 +831,14 @@ static int pauses(dap3d_model *m, double *end)
     return m->between(m->who, m->t, end);
 }
 
+/* The run has stopped before a report: its present time is where that was. */
+static int stopped_here(dap3d_model *m)
+{
+    m->t = real_of(m)[R_t];
+    m->has_row = m->is_ahead = 0;
+    return stopped(m);
+}
+
 /* Integrate beyond a time, and interpolate there: as a run with reports. */
 static int step_freely(dap3d_model *m, double t)
 {
@@ -834,12 +849,12 @@ static int step_freely(dap3d_model *m, double t)
     if (integer_of(m)[I_status] == FINISHED)
         integer_of(m)[I_status] = RUNNING; /* the last step has reached the end, and reported it */
     if (integer_of(m)[I_status] == JUMPED && !apply_jump(m))
-        return stopped(m);
+        return stopped_here(m);
     if (real_of(m)[R_t] >= t)
         advance(m, -1); /* no step */
     while (integer_of(m)[I_row_count] == 0) {
         if (integer_of(m)[I_status] != RUNNING && !apply_jump(m))
-            return stopped(m);
+            return stopped_here(m);
         advance(m, 0);
         if (integer_of(m)[I_row_count] == 0 && pauses(m, &t))
             return DAP3D_OK;
@@ -929,7 +944,7 @@ static int hold_to(dap3d_model *m, double end)
             if (status == JUMPED && apply_jump(m))
                 continue;
             if (!hand_over(m))
-                return m->t = real_of(m)[R_t], m->has_row = m->is_ahead = 0, stopped(m);
+                return stopped_here(m);
             m->first_h = real_of(m)[R_h];
             m->first_rejected = integer_of(m)[I_rejected_count];
         }
@@ -1036,6 +1051,7 @@ int dap3d_set_states(dap3d_model *m, double t, const double *y)
     for (int k = 0; k < STATES; k++)
         if (!(fabs(y[k]) <= LARGEST))
             return fail(m, DAP3D_INVALID, "a state is not finite");
+    start(m);
     if (!(t >= 0.0 && t <= m->t_end * (1.0 + ALIKE))) /* sums of steps round */
         return fail(m, DAP3D_INVALID, "the time is not one of the run");
     double *real = real_of(m);
@@ -1044,6 +1060,11 @@ int dap3d_set_states(dap3d_model *m, double t, const double *y)
     m->is_under_way = 1;
     m->has_row = m->is_ahead = 0;
     m->is_over = GOES_ON;
+#if CONTACTS /* changes and steps behind t are those of another course */
+    m->failure = m->change_count = 0;
+    m->stood = integer_of(m)[I_step_count];
+    m->since = t;
+#endif
     integer_of(m)[I_status] = RUNNING;
     integer_of(m)[I_next_report] = 1;
 #if COMPLETES
@@ -1066,6 +1087,7 @@ int dap3d_derivatives(dap3d_model *m, double t, const double *y, double *rates)
         return fail(m, DAP3D_INVALID, "steps follow contacts here: states have no derivatives");
     if (!are_ordered(m))
         return DAP3D_INVALID;
+    start(m); /* which weighs the bodies */
     call(m, RHS, t, y, rates, STATES);
     for (int k = 0; k < STATES; k++)
         if (!(fabs(rates[k]) <= LARGEST))
@@ -1161,6 +1183,7 @@ int dap3d_project(dap3d_model *m, double t, double *y, double *moved)
 {
     double out[PROJECTED + 1] = {0.0}, before[STATES], largest = 0.0;
     memcpy(before, y, sizeof before);
+    start(m);
     if (integer_of(m)[I_projects])
         call(m, PROJECT, t, y, out, PROJECTED);
     for (int k = 0; k < STATES; k++)
@@ -1225,6 +1248,7 @@ int dap3d_indicator_count(void) { return SWITCHES; }
 
 int dap3d_indicators(dap3d_model *m, double t, const double *y, double *values)
 {
+    start(m);
     if (SWITCHES)
         call(m, WATCH, t, y, values, SWITCHES);
     return DAP3D_OK;
