@@ -153,3 +153,31 @@ def test_what_an_element_has_of_a_class_in_parts(tmp_path):
     assert shape.fields["size"] == (8.0, 4.0, 6.0)
     assert shape.fields["p"] == pytest.approx([0.5**0.5, 0.5**0.5, 0.0, 0.0], abs=1e-15)
     assert (material.mu, material.mu_spin, material.mu_roll) == (2.0, 0.1, 0.2)
+
+
+@pytest.mark.parametrize(("text", "message"), [
+    ('<compiler angle="Radian"/>', "angle of <compiler> = 'Radian' should be radian or degree"),
+    ('<compiler inertiafromgeom="yes"/>', "inertiafromgeom of <compiler> = 'yes' should be auto"),
+    ('<option><flag gravity="false"/></option>', "gravity of <flag> = 'false' should be enable"),
+    ('<default><joint limited="1"/></default>', "limited of <joint> = '1' should be auto or true"),
+    ('<default><geom mass="-3"/></default>', "mass of <geom> = -3 should be 0 or more"),
+    ('<default><geom density="-3"/></default>', "density of <geom> = -3 should be 0 or more"),
+])  # fmt: skip
+def test_words_and_masses_that_mean_nothing_are_refused(tmp_path, text, message):
+    """They were read as the default: degrees, no limit, the mass of water."""
+    body = '<worldbody><body><joint range="-1 1"/><geom size="0.1"/></body></worldbody>'
+    with pytest.raises(dap.SceneError, match=message):
+        imported(tmp_path / "a.xml", text + body)
+
+
+@pytest.mark.parametrize(("bound", "mass", "moment"), [
+    ('boundmass="0.5"', 1.5, 0.004 + 1.0 / 3.0),
+    ('boundinertia="0.01"', 1.0, 0.02),
+])  # fmt: skip
+def test_bounds_of_mass_and_inertia_hold_by_themselves(tmp_path, bound, mass, moment):
+    """A body without geoms, 1 m above that of a ball it is fixed to: Steiner's theorem."""
+    ball = '<geom size="0.1" mass="1"/><body pos="0 0 1"/>'
+    scene, _ = imported(tmp_path / "a.xml", f"<compiler {bound}/><worldbody><body name='a'>"
+                        f"<joint/>{ball}</body></worldbody>")  # fmt: skip
+    assert scene.bodies["a"].mass == mass
+    assert scene.bodies["a"].Jp[0] == pytest.approx(moment, rel=1e-15)

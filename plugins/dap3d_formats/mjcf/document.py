@@ -33,6 +33,14 @@ ACTUATORS = (
 LISTS = {"size", "friction", "gear", "stiffness", "damping", "gainprm", "biasprm", "dynprm"}
 #: How an element is turned; one is given.
 TURNS = {"quat", "axisangle", "euler", "xyaxes", "zaxis"}
+#: Attribute -> the words that it may be, as of the compiler that reads no others.
+WORDS = {
+    **dict.fromkeys(("limited", "ctrllimited", "forcelimited", "actlimited", "actuatorfrclimited",
+                     "inertiafromgeom"), ("auto", "true", "false")),
+    **dict.fromkeys(("active", "autolimits", "balanceinertia", "mocap", "shellinertia",
+                     "strippath"), ("true", "false")),
+    "angle": ("radian", "degree"),
+}  # fmt: skip
 #: Words of a law.
 LAW = ("gaintype", "gainprm", "biastype", "biasprm", "dyntype", "dynprm")
 #: Numbers of a muscle as MJCF has them in gainprm, with their defaults.
@@ -120,6 +128,7 @@ class Document:
         if root.name not in ("mujoco", "mujocoinclude"):
             raise FormatError(f"an MJCF file is a <mujoco>, not a <{root.name}>", root.place)
         _include(source, root, folder)
+        _require_words(root)
         for asset in (one for holder in root.all("asset") for one in holder):
             if "file" in asset.attributes and asset.name in ("mesh", "hfield"):
                 asset.attributes.setdefault("name", Path(asset.attributes["file"]).stem)
@@ -242,6 +251,17 @@ def _include(source: Source, element: XmlElement, folder: Path) -> None:
             _include(source, root, folder)
         children += root.children
     element.children = children
+
+
+def _require_words(element: XmlElement) -> None:
+    """Refuse words of attributes that mean nothing, all over a tree."""
+    for key, word in element.attributes.items():
+        allowed = ("enable", "disable") if element.name == "flag" else WORDS.get(key, (word,))
+        if word not in allowed:
+            what = f"{key} of <{element.name}> = {word!r} should be {' or '.join(allowed)}"
+            raise FormatError(what, element.place)
+    for child in element:
+        _require_words(child)
 
 
 def _xyaxes(element: XmlElement) -> Any:

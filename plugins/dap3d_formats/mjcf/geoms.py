@@ -170,11 +170,14 @@ class Geoms:
         """Mass and inertia of a geom in the axes of its link, or None for none.
 
         Raises:
-            FormatError: a mesh cannot be read, or encloses nothing.
+            FormatError: a mesh cannot be read, or encloses nothing; mass or density is negative.
         """
         kind = self.kind(geom)
         mass = geom.number("mass", -1.0)
         density = geom.number("density", WATER)
+        for key, value in (("mass", mass), ("density", density)):
+            if value < 0.0 and key in geom.attributes:
+                raise FormatError(f"{key} of <geom> = {value:g} should be 0 or more", geom.place)
         if kind in FLAT or mass == 0.0 or (mass < 0.0 and density == 0.0):
             return None
         if geom.get("shellinertia") == "true":

@@ -365,7 +365,7 @@ def _names(root: XmlElement) -> Iterator[str]:
 def _bounded(inertial: Inertial | None, compiler: XmlElement) -> Inertial | None:
     """The inertial, not below the least that the compiler allows; balanced where it says so."""
     mass, moment = compiler.number("boundmass", 0.0), compiler.number("boundinertia", 0.0)
-    if inertial is None and not (mass and moment):
+    if inertial is None and not (mass or moment):
         return None
     inertial = inertial or Inertial(0.0)
     moments, axes = np.linalg.eigh(inertial.inertia)

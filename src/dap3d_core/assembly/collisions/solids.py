@@ -131,8 +131,10 @@ def _pair(
     )  # fmt: skip
 
 
-#: Feature of the point between the ends of a capsule.
-BETWEEN = 2
+#: Features of points between the ends of a capsule: the nearest, and from here on those at edges.
+BETWEEN, EDGE = 2, 3
+#: Part of the radius by which these are apart, or else they are one.
+TWICE = 1e-3
 
 
 @compiled
@@ -225,19 +227,44 @@ def sphere_cylinder(shapes: PlacedShapes, count: int, i: int, j: int) -> int:
 
 @compiled
 def capsule_box(shapes: PlacedShapes, count: int, i: int, j: int) -> int:
-    """Box i and capsule j: the balls at its ends, and that at its point nearest to the box."""
+    """Box i and capsule j: the balls at its ends, at its point nearest to the box, and at edges.
+
+    These are where the axis passes faces first and last: one that lies across a box lies on two
+    edges, both of them as near.
+    """
     c, w, radius, half = shapes.centre[j], shapes.axes[j], shapes.size[j, 0], shapes.size[j, 1]
     low, high = -half, half
+    nearest = low if slope(shapes, low, i, j) >= 0.0 else high
     # the squared distance is convex along the axis: its slope is monotonic
     if slope(shapes, low, i, j) < 0.0 < slope(shapes, high, i, j):
-        s = _lowest(shapes, low, high, i, j)
-        x, y, z = c[0] + s * w[2], c[1] + s * w[5], c[2] + s * w[8]
+        nearest = _lowest(shapes, low, high, i, j)
+        x, y, z = c[0] + nearest * w[2], c[1] + nearest * w[5], c[2] + nearest * w[8]
         count = ball_box(shapes, count, i, j, BETWEEN, x, y, z, radius)
     for end in range(2):
         s = half * (2.0 * end - 1.0)
         x, y, z = c[0] + s * w[2], c[1] + s * w[5], c[2] + s * w[8]
         count = ball_box(shapes, count, i, j, end, x, y, z, radius)
+    for end in range(2):
+        edge, way = nearest, 2.0 * end - 1.0
+        for k in range(6):
+            s = _passing(shapes, k, i, j)
+            if low < s < high and way * (s - edge) > 0.0:
+                edge = s
+        if abs(edge - nearest) > TWICE * radius:
+            x, y, z = c[0] + edge * w[2], c[1] + edge * w[5], c[2] + edge * w[8]
+            count = ball_box(shapes, count, i, j, EDGE + end, x, y, z, radius)
     return count
+
+
+@compiled
+def _passing(shapes: PlacedShapes, k: int, i: int, j: int) -> float:
+    """Where the axis of capsule j passes the plane of face k of box i; 1e300 along it."""
+    c, w, d, u = shapes.centre[j], shapes.axes[j], shapes.centre[i], shapes.axes[i]
+    face, side = k // 2, 2.0 * (k % 2) - 1.0
+    rate = u[face] * w[2] + u[3 + face] * w[5] + u[6 + face] * w[8]
+    if abs(rate) <= 1e-12:
+        return 1e300
+    return (side * shapes.size[i, face] - local(c[0], c[1], c[2], d, u, face)) / rate
 
 
 @compiled
@@ -256,17 +283,13 @@ def slope(shapes: PlacedShapes, s: float, i: int, j: int) -> float:
 @compiled
 def _lowest(shapes: PlacedShapes, low: float, high: float, i: int, j: int) -> float:
     """The zero of a slope that is linear between places where a face is passed."""
-    c, w, d, u = shapes.centre[j], shapes.axes[j], shapes.centre[i], shapes.axes[i]
     for k in range(6):
-        face, side = k // 2, 2.0 * (k % 2) - 1.0
-        rate = u[face] * w[2] + u[3 + face] * w[5] + u[6 + face] * w[8]
-        if abs(rate) > 1e-12:
-            s = (side * shapes.size[i, face] - local(c[0], c[1], c[2], d, u, face)) / rate
-            if low < s < high:
-                if slope(shapes, s, i, j) < 0.0:
-                    low = s
-                else:
-                    high = s
+        s = _passing(shapes, k, i, j)
+        if low < s < high:
+            if slope(shapes, s, i, j) < 0.0:
+                low = s
+            else:
+                high = s
     first, last = slope(shapes, low, i, j), slope(shapes, high, i, j)
     return low - first * (high - low) / (last - first) if last > first else 0.5 * (low + high)
 

@@ -244,6 +244,22 @@ def test_boxes_meet_where_their_faces_and_edges_do():
     assert found.point[0] == pytest.approx([0.0, 0.0, edge - 5e-7], abs=1e-14)
 
 
+@pytest.mark.parametrize("middle", [0.0, 0.1, -0.25])
+def test_a_capsule_that_lies_across_a_box_touches_both_edges(middle):
+    """Or one edge and its end; tilted by 1e-4, it is farther from one of them by that."""
+    pair = finder([BOX, CAPSULE], [[0.2, 0.3, 0.1], [0.05, 0.4, 0.0]])
+    places = np.array([[0.0, 0.0, 0.0], [middle, 0.0, 0.15]])
+    wanted = np.array([max(-0.2, middle - 0.4), min(0.2, middle + 0.4)])
+    for tilt in (0.0, 1e-4):
+        angle = np.pi / 4.0 - tilt / 2.0
+        p = np.array([[1.0, 0.0, 0.0, 0.0], [np.cos(angle), 0.0, np.sin(angle), 0.0]])
+        found = pair.find(places, p, np.full(3, 1e-4))
+        for x in wanted:
+            k = np.argmin(np.abs(found.point[:, 0] - x))
+            assert found.point[k, :2] == pytest.approx([x, 0.0], abs=1e-15 + 0.1 * tilt)
+            assert found.gap[k] == pytest.approx((x - middle) * tilt, abs=1e-15 + tilt**2)
+
+
 @pytest.mark.parametrize("kind", SOLIDS)
 def test_solids_at_a_plane_have_the_height_of_their_lowest_point(kind):
     rng, down = np.random.default_rng(2), np.array([0.0, 0.0, -1.0])
