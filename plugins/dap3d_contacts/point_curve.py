@@ -26,13 +26,6 @@ def polar(s, f, f_dot, f_ddot):
     return (r * e[0], r * e[1]), first, second
 
 
-def around(f):
-    """What draws a polar curve: points (s, x, y, z) of a closed one."""
-    turn = [2.0 * math.pi * k / SAMPLES for k in range(SAMPLES)]
-    places = [[s, f(s)[0] * math.cos(s), f(s)[0] * math.sin(s), 0.0] for s in turn]
-    return {"samples": places, "is_closed": 1.0}
-
-
 def nearest(place, start, side, curve):
     """The signed distance of a place from a curve, the normal and the point nearest to it.
 
@@ -232,7 +225,7 @@ class PointCurve(Contact):
         if self.radius_j and not in_space:
             raise ValueError("radius_j is that of a wire or pipe, a curve given by x, y and z")
         if "x" not in functions:
-            return around(functions["function"]) if self.polar else {}
+            return {}
         curve = Curve([functions[name] for name in given], self.s_min, self.s_max)
         sense = 1.0 if self.side == "above" else -1.0
         if self.closed:

@@ -131,7 +131,7 @@ def pulled(mu=0.3, x=0.0, y=0.0, across=0.0, **coefficients):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("integrator", ["dop853", "radau"])
+@pytest.mark.parametrize("integrator", ["dop853", pytest.param("radau", marks=pytest.mark.long)])
 def test_contacts_that_share_a_load_and_begin_to_slide_together(integrator):
     """From t0 = mu m g / 5 on, at which no share holds any more, m x'' = 5 (t - t0).
 
@@ -155,7 +155,7 @@ def test_contacts_that_share_a_load_and_begin_to_slide_together(integrator):
     [
         ({"integrator": "radau"}, {}),  # through slow slip, of which explicit steps take thousands
         ({}, {"mu_s": 0.36}),
-        ({"method": "joint"}, {"mu_s": 0.36}),
+        pytest.param({"method": "joint"}, {"mu_s": 0.36}, marks=pytest.mark.long),
     ],
     ids=["slow", "lsq", "joint"],
 )

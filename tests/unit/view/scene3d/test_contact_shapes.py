@@ -47,19 +47,6 @@ def test_each_surface_is_drawn_once_where_it_touches(scene):
     assert tuple(cam[0]) == tuple(cam[-1]), "it is closed"
 
 
-def test_a_polar_curve_is_drawn_all_around():
-    scene = dap.Scene()
-    scene.add_body("cam", mass=1.0, Jp=[0.1] * 3)
-    scene.add_body("roller", mass=1.0, Jp=[0.1] * 3, r=[0.0, 0.6, 0.0])
-    scene.add_function("harmonic", "profile", amplitude=0.1, frequency=1.0, offset=0.4)
-    scene.add_contact("point_curve", P_i="roller.O", P_j="cam.O", polar=True, function="profile")
-    (shape,) = contact_shapes(dap.compile(scene).model)
-    x, y, z = np.array(shape.values["points"]).T
-    assert np.hypot(x, y) == pytest.approx(0.4 + 0.1 * np.sin(np.arctan2(y, x)))
-    assert (x[0], y[0]) == (x[-1], y[-1]) == (0.4, 0.0)
-    assert not z.any()
-
-
 def test_bodies_with_shapes_of_their_own_keep_them(scene):
     scene = scene.copy()
     scene.add_shape("cylinder", "drum", body="ball", radius=0.3, length=0.1)
