@@ -81,7 +81,7 @@ def _families(items):
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
     """Of the cases of a verification the quick tests take the first, of `every(n)` each n-th, of
-    any other test that has more than five some five. Of those that they leave CI verifies some
+    any other test that has more than three some three. Of those that they leave CI verifies some
     `MOST_CASES`, without order: each n-th would have the same value of some parameter. Examples of
     the documents are all run."""
     for found in _families(i for i in items if not i.get_closest_marker("slow")):
@@ -91,7 +91,7 @@ def pytest_collection_modifyitems(items):
         elif "/verification/" in found[0].path.as_posix():
             n = len(found)
         else:
-            n = max(5, ceil(len(found) / 5)) if len(found) > 5 else 1
+            n = max(3, ceil(len(found) / 3)) if len(found) > 3 else 1
         for k, item in enumerate(found):
             if k % n:
                 item.add_marker("slow")

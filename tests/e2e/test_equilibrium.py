@@ -44,6 +44,7 @@ def test_a_fall_is_a_message_and_exit_code_1(dap3d, folder):
     assert not (folder / "ball.nc").exists()
 
 
+@pytest.mark.slow
 def test_a_run_starts_from_a_result_or_at_rest(dap3d, folder):
     dap3d.succeed("run", "toggle.toml", "--t-end", "0.1", "-o", "a.nc")
     done = dap3d.succeed(

@@ -207,6 +207,7 @@ def test_a_limit_on_files_is_named_before_the_run(scene_file):
     assert found.returncode == 0, found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", quickly(["nonsense", "../x", "x86-64-v2 ", "pentium4", "'"]))
 def test_an_unknown_processor_is_one_sentence(scene_file, name):
     """LLVM would end the process; the type whose kernels come first is not blamed."""

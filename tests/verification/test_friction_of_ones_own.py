@@ -223,6 +223,7 @@ def test_steps_extrapolate_to_events(keyword, law):
     assert np.abs((8.0 * third - 6.0 * second + first) / 3.0 - exact).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_a_law_that_jumps_or_drives_is_found():
     class Jump(Stribeck):
         keyword = "test-jump"

@@ -502,6 +502,7 @@ def test_slow_motions_and_quick_ones_are_those_of_ordinary_scenes(make, units):
     np.testing.assert_allclose(ours.w * u.s, theirs.w, atol=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length", [1e-4, 1e4])
 def test_rates_of_a_motion_that_is_given_do_not_depend_on_its_size(length):
     """A rod on a hinge by positions of its middle: what splines make of these is the same.

@@ -35,7 +35,8 @@ def test_the_map_has_every_folder_of_the_core():
 OF_SEVERAL = {
     "docs/test_complete.py", "docs/test_contributing.py", "kernels/compiler/test_bits.py",
     "kernels/compiler/test_complex.py", "kernels/compiler/test_core.py",
-    "kernels/compiler/test_refusals.py", "simulation/test_only_what_is_needed.py",
+    "kernels/compiler/test_refusals.py", "native/source/test_fmi.py",
+    "simulation/test_only_what_is_needed.py",
     "testing/checks/test_functions.py",
 }  # fmt: skip
 

@@ -6,6 +6,8 @@ import sys
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 
+import pytest
+
 from dap3d_core.kernels.syntax import parse
 
 
@@ -20,6 +22,7 @@ class Finalised:
             pass
 
 
+@pytest.mark.slow
 def test_threads_parse_at_once():
     """Sweeps build scenes anew in threads; Python 3.11 itself fails in an eighth of such calls."""
     text = "+".join(f"(a{k} * (b - (c / (d + {k}))))" for k in range(100))

@@ -197,6 +197,7 @@ def test_a_parameter_is_set_before_a_run_or_in_its_course(tmp_path):
     assert run["der(state.cart.rd.x)"] == pytest.approx((-10.0 * y - 0.3 * v) / 2.0, rel=1e-14)
 
 
+@pytest.mark.slow
 def test_values_that_a_scene_refuses_are_refused(tmp_path):
     """By name, value and limit, and nothing is set; values at the limits are taken."""
     scene = braced(tmp_path)
@@ -295,6 +296,7 @@ def test_names_and_descriptions_end_no_comment_and_are_legal_xml(tmp_path):
         assert root.get("description") == scene.description.translate({1: " ", 0xFFFE: " "})
 
 
+@pytest.mark.slow
 def test_a_parameter_of_a_table_is_one_as_well(tmp_path):
     scene = _written(SPRING, tmp_path)
     made, _ = exported(scene, tmp_path, parameters=["parameters.stiffness"])
@@ -348,6 +350,7 @@ def test_what_cannot_be_exported_is_refused_by_name(tmp_path, options, said):
         exported(_written(SPRING, tmp_path), tmp_path, **options)
 
 
+@pytest.mark.slow
 def test_steps_that_make_no_sense_are_refused(tmp_path):
     _, library = exported(dap.load("pen1"), tmp_path)
     run = library.start(1.0)
@@ -367,6 +370,7 @@ def test_steps_that_make_no_sense_are_refused(tmp_path):
         run["state.con.r.x"]
 
 
+@pytest.mark.slow
 def test_steps_go_on_from_a_state_that_is_set_behind_the_end(tmp_path):
     _, library = exported(dap.load("pen1"), tmp_path)
     states = [name for name, kind in library.kinds.items() if kind == "state"]
@@ -390,6 +394,7 @@ def test_rates_before_a_run_begins_are_those_of_the_mass_that_was_set(tmp_path):
     assert np.array_equal(before, run.derivatives(0.0, y))
 
 
+@pytest.mark.slow
 def test_a_run_that_fails_is_where_it_stopped(tmp_path):
     _, library = exported(dap.load("A05"), tmp_path, integrator="rk4", step=1e-3)
     states = [name for name, kind in library.kinds.items() if kind == "state"]
@@ -479,6 +484,7 @@ def test_what_would_be_said_wrongly_is_refused(tmp_path, given, said):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_an_output_that_is_named_twice_is_one(tmp_path):
     made = dap.export_model(
         _written(SPRING, tmp_path), tmp_path / "out", format="c", outputs=["cart.r", "cart.r.x"]
@@ -607,6 +613,7 @@ def test_a_folder_of_another_model(tmp_path):
     assert (tmp_path / "mine" / "README.md").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_a_name_that_is_no_identifier(tmp_path):
     scene = _written(SPRING, tmp_path)
     scene.name = "4 größen"

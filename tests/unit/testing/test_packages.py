@@ -60,6 +60,7 @@ def install(tmp_path, monkeypatch):
     return put
 
 
+@pytest.mark.slow
 def test_tests_that_are_installed_are_run(install):
     """In files test_*.py and *_test.py; the outcome of one that fails has its last lines."""
     fails = "def test_it():\n    assert 6 * 7 == 41, 'no answer'\n"

@@ -69,6 +69,7 @@ def test_the_motion_of_a_type_of_ones_own(tmp_path):
     }
 
 
+@pytest.mark.slow
 def test_the_file_of_an_installed_package_is_its_module():
     """Also one that imports from its package; what is installed needs no permission to run."""
     path = gear.__file__
@@ -76,6 +77,7 @@ def test_the_file_of_an_installed_package_is_its_module():
     assert json.loads(output) == json.loads(checked(gear.__name__, "--json", "--poses", "1"))
 
 
+@pytest.mark.slow
 def test_a_file_of_the_same_name_elsewhere_is_no_part_of_the_package(tmp_path):
     path = tmp_path / "gear.py"
     path.write_text(SLEEVE)

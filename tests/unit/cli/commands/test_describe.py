@@ -114,6 +114,7 @@ def test_the_kernels_of_a_type_can_be_read():
     assert facts["source"]["C"] == "def C(r_P_i, r_P_j):\n    return sub(r_P_j, r_P_i)"
 
 
+@pytest.mark.slow
 def test_the_program_of_a_model_is_counted():
     """By the functions that its operations come from; a scene of too many bodies has none."""
     text = described("pen1", "--source", width=60)

@@ -40,6 +40,7 @@ def test_json(model, capsys):
     np.testing.assert_allclose(one["elasticities"], expected * [G, V0] / z, rtol=1e-11)
 
 
+@pytest.mark.slow
 def test_table_fits_sixty_columns(model):
     """By default the position of the last body; of what is zero there is no elasticity."""
     lines = lines_of(*model, "-o", "stone.png")

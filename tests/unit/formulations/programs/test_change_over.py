@@ -52,7 +52,7 @@ def programs(records):
     return list(records.values())[-1].programs
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(5)
 @pytest.mark.parametrize(("model", "method"), [("pen1", "standard"), ("pen1", "joint"),
                          ("fourbar3", "joint"), ("fourbar2", "lsq"),
                          ("bodies2", "unconstrained")])  # fmt: skip

@@ -86,7 +86,7 @@ CASES = [(*one, "O3") for one in TYPES] + [
 ]
 
 
-@pytest.mark.every(9)
+@pytest.mark.every(18)
 @pytest.mark.parametrize(("kind", "keyword", "level"), CASES)
 def test_traced_loops_have_the_bits_of_plain_python(kind, keyword, level):
     for type_info, loop in loops_of(REGISTRY.get(kind, keyword)):

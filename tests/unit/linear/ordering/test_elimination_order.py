@@ -24,6 +24,7 @@ def arguments(graph):
     return n, [slots for slots, _ in joints], [rows for _, rows in joints]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("net", [rod_net, plate_net])
 def test_fill_of_a_net_grows_as_nested_dissection_promises(net):
     """Of k x k knots the fill is O(k^2 log k), the work O(k^3) (George 1973): from k to 2 k fill

@@ -54,6 +54,7 @@ def test_open_and_closed_ends_are_said(tmp_path):
     assert [said for *_, said in e.ends] == ["should be at least 0", "should be at most 1"]
 
 
+@pytest.mark.slow
 def test_of_two_in_order_one_is_under_the_other(tmp_path):
     """Whatever the other is; limits that are other numbers of the scene take a few checks."""
     names = "materials.surface.mu", "materials.surface.mu_s"

@@ -139,6 +139,7 @@ def test_what_a_script_had_set_is_named_and_the_scene_keeps_its_numbers():
     assert not any("others" in note for note in before.notes)
 
 
+@pytest.mark.slow
 def test_a_joint_that_has_broken_stays_so(tmp_path):
     """Through two further runs and a checkpoint; a scene in which it cannot be so is refused."""
     rod = dap.Scene(name="rod")

@@ -105,6 +105,7 @@ def test_a_limit_that_a_hinge_rests_at():
     assert np.abs(held - [0.0, 0.0, 2.0 * g]).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_an_actuator_pulls_a_block_over_the_floor():
     """F = m x'' + mu m g, with x = t + 0.3 t^3."""
     scene = dap.Scene(name="pulled")

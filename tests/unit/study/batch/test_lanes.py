@@ -99,6 +99,7 @@ def test_a_lane_takes_the_next_point_when_its_run_has_ended():
     assert len(points) > 2 * lanes_of(of).count
 
 
+@pytest.mark.slow
 def test_projections_take_the_ways_of_a_run():
     """How many passes they need at the start of the first run says little of its course."""
     settings = {"t_end": 0.5, "dt": 0.5}

@@ -99,7 +99,7 @@ def rolling(**resists):
 RUBS = {"mu": 0.4, "radius": 0.05}
 
 
-@pytest.mark.every(13)  # of each setting and each kind one
+@pytest.mark.every(40)
 @pytest.mark.parametrize("settings", [{"method": "lsq"}, {"method": "joint"},
                                       {"integrator": "radau"}], ids=str)  # fmt: skip
 @pytest.mark.parametrize(

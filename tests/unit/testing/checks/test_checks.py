@@ -365,7 +365,7 @@ PLANTED = [
 ]  # fmt: skip
 
 
-@pytest.mark.every(11)
+@pytest.mark.every(15)
 @pytest.mark.parametrize(
     ("type_", "failing", "words"),
     PLANTED,
