@@ -20,7 +20,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 #: Slow cases of one test that CI verifies, about; the others are long.
-MOST_CASES = 6
+MOST_CASES = 4
 
 
 @pytest.hookimpl(tryfirst=True)

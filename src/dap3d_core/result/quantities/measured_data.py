@@ -64,8 +64,10 @@ class MeasuredData:
 
 
 def _plain(unit: str) -> str:
-    """A unit without what people write differently: N*m and N m, m/s² and m/s^2."""
-    return "".join(c for c in unit.replace("²", "2").replace("-", "1") if c not in " *·.^")
+    """A unit without what people write differently: N*m and N m, m/s² and m/s^2, rad/s and 1/s."""
+    for written, plain in (("²", "2"), ("-", "1"), ("rad", "1")):
+        unit = unit.replace(written, plain)
+    return "".join(c for c in unit if c not in " *·.^")
 
 
 def is_number(value: Any) -> bool:

@@ -53,6 +53,7 @@ def test_a_driver_that_goes_on_into_a_limit_is_named_with_the_contact():
         dap.simulate(scene, t_end=1.0)
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("mu", [0.0, 0.5])
 def test_a_winch_that_lowers_a_box_into_the_floor_is_told_from_friction_that_jams(mu):
     """Each corner alone could give way; all of them together cannot."""
@@ -68,6 +69,7 @@ def test_a_winch_that_lowers_a_box_into_the_floor_is_told_from_friction_that_jam
         dap.simulate(scene, t_end=1.0)
 
 
+@long_in_plain_python
 def test_a_body_behind_a_surface_that_begins_in_it_is_named_with_the_depth():
     scene = dap.Scene(name="under a shelf")
     scene.add_body("ball", mass=1.0, r=(-0.5, -0.2, 0.0), r_dot=(1.0, 0.0, 0.0))
