@@ -7,6 +7,7 @@ from support.bouncing import bouncing
 from support.plain import jit_is_on
 
 import dap3d_core as dap
+from dap3d_core.result.quantities.measured_data import MeasuredData
 
 #: Each fit is some 30 runs, which take long where nothing is compiled.
 compiled = pytest.mark.skipif(not jit_is_on(), reason="many runs without compilation")
@@ -377,6 +378,7 @@ def test_what_is_refused(given, data, settings, words):
         ("t,height", "give outputs={COLUMN: QUANTITY}"),
         ("t [s],mass.rd.x [m/s²]", "in m/s², and it is in m/s: convert"),
         ("t,mass.rdd.x [m / s²]", ""),
+        ("t,mass.w.z [deg/s]", "in deg/s, and it is in rad/s: convert"),
     ],
 )
 def test_columns_of_a_file_in_other_units_are_refused(tmp_path, header, words):
@@ -433,3 +435,10 @@ def test_a_fit_is_drawn(tmp_path):
         dap.plot(fit, "mass.r.z")
     with pytest.raises(ValueError, match="x axis of its own"):
         dap.plot(fit, x="t")
+
+
+def test_a_radian_is_a_number():
+    """So that speeds of turning in 1/s are those in rad/s."""
+    data = MeasuredData(np.zeros(1), {}, {}, {}, {"w": "1/s", "n": "rpm"})
+    assert data.unlike("w", "rad/s") == ""
+    assert "in rpm, and it is in rad/s" in data.unlike("n", "rad/s")
