@@ -26,12 +26,12 @@ from dap3d_core.kernels import minimum, neg, row, scale, sqrt, sub, where
 
 ZERO = (0.0, 0.0, 0.0)
 X = (1.0, 0.0, 0.0)
+ENDS = {"P_i": (Point, point()), "P_j": (Point, point())}
 
 
 def type_of(base, **members):
     """A class of this base as an author would write it, with two points if it has no fields."""
-    fields = {"P_i": (Point, point()), "P_j": (Point, point())}
-    fields = members.pop("fields", fields)
+    fields = members.pop("fields", ENDS)
     space = {"keyword": "mine", "__module__": __name__, **members}
     space |= {name: maker for name, (_, maker) in fields.items()}
     space["__annotations__"] = {name: kind for name, (kind, _) in fields.items()}
@@ -155,10 +155,12 @@ def prepare(constants):
          ["more than one vector2", "ends P_i and P_j", "sub(r_Q_j, r_Q_i)"]),
         (joint(fields={"a_i": (Vector, vector(across="b_j"))}),
          ["a_i is across b_j, which is no vector field"]),
-        (joint(fields={"k": (float, number("100"))}), ["default '100', which is no finite number"]),
-        (joint(fields={"k": (float, number(-1.0, positive=True))}),
+        (joint(fields=ENDS | {"k": (float, number("100"))}),
+         ["default '100', which is no finite number"]),
+        (joint(fields=ENDS | {"k": (float, number(-1.0, positive=True))}),
          ["Mine.k has the default -1.0, and is to be positive"]),
-        (joint(fields={"k": (float, number(3, maximum=2.0))}), ["which is out of its bounds"]),
+        (joint(fields=ENDS | {"k": (float, number(3, maximum=2.0))}),
+         ["which is out of its bounds"]),
         # prepare
         (joint(prepare=prepare(None)), ["Mine.prepare should return a dict", "None"]),
         (joint(prepare=prepare([1.0])), ["Mine.prepare should return a dict", "[1.0]"]),
