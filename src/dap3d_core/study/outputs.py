@@ -19,18 +19,26 @@ from dap3d_core.simulation.output.check_outputs import probe_of
 from dap3d_core.study.parameters import TABLES, SceneParameter, with_values
 
 
+def _integral(values: Floats, t: Floats) -> Any:
+    """The integral over time, by the trapezoidal rule."""
+    return np.trapezoid(values, t, axis=-1)
+
+
 def _mean(values: Floats, t: Floats) -> Any:
-    """The mean over time, by the trapezoidal rule."""
+    """The mean over time."""
     span = t[-1] - t[0]
-    return np.trapezoid(values, t, axis=-1) / span if span else values[..., -1]
+    return _integral(values, t) / span if span else values[..., -1]
 
 
 #: Of values (..., nt) of a quantity at the reported instants t (nt,).
 REDUCTIONS: dict[str, Callable[[Floats, Floats], Any]] = {
     "end": lambda values, t: values[..., -1],
+    "final": lambda values, t: values[..., -1],  # the same
     "min": lambda values, t: np.min(values, axis=-1),
     "max": lambda values, t: np.max(values, axis=-1),
     "mean": _mean,
+    "rms": lambda values, t: np.sqrt(_mean(values**2, t)),
+    "integral": _integral,
     "series": lambda values, t: values,
 }
 
@@ -209,7 +217,7 @@ class Reduction:
         series = [output.name for output in self.outputs if output.reduction == "series"]
         if timing and series:
             what = f"a series has the same length at each point, and {timing[0]} varies"
-            remedy = "use :end, :min, :max or :mean"
+            remedy = "use one number of it, such as :end, :max or :mean"
             raise SceneError(Mistake("outputs", name, what, remedy=remedy) for name in series)
 
     def reduce(self, rows: Floats, times: Floats) -> dict[str, Floats]:
@@ -261,6 +269,8 @@ class Reduction:
                 if quantity.owner == "output" and self._tables == set(TABLES):
                     of_rows &= not any(e.parameters for e in probe.outputs.values())
             expanded += components
+            if output.reduction == "integral":
+                unit = f"{unit} s".strip()
             for name in (component.name for component in components):
                 self.labels[name], self.units[name], self.of_rows[name] = label, unit, of_rows
         if mistakes:

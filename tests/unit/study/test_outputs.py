@@ -27,7 +27,7 @@ def test_forms_of_outputs():
         (3, "an output is text"),
         ([3], "an output is text"),
         ("rod.r.z:maximum", "did you mean 'rod.r.z:max'"),
-        ("rod.r.z:", "the reduction after the colon is one of end, min, max, mean, series"),
+        ("rod.r.z:", "the reduction after the colon is one of end, final, min, max, mean, rms"),
         (":max", "an output is text"),
         (["rod.r.z", "rod.r.z"], "named once only"),
         ([lambda result: 0.0], "needs a label"),

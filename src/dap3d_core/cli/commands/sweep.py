@@ -33,8 +33,8 @@ OPTIONS = {"vary": "--vary", "outputs": "--keep"} | {
                       "1:100:5:log, 10,50,100; may be given again. Samples: 1:5, 1:100:log, 3~0.1 "
                       "(mean~deviation), 10,50,100."),
     click.option("--keep", multiple=True, metavar="QUANTITY[:WHAT]",
-                 help="An output of each run: crank.r.z:max; end (by default), min, max, mean or "
-                      "series; may be given again."),
+                 help="An output of each run: crank.r.z:max; end (by default), min, max, mean, "
+                      "rms, integral or series; may be given again."),
     click.option("--sample", type=int, metavar="N",
                  help="Run N samples instead of the grid of all combinations."),
     click.option("--design", metavar="NAME",

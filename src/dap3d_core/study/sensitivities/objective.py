@@ -28,11 +28,7 @@ OWN = ("scene", "by", "allow_code", "announce")
 #: Name of the output that an expression becomes.
 NAME = "objective"
 #: Numbers of a quantity over a run, by their names.
-NUMBERS: dict[str, Callable[[Floats, Floats], Any]] = {
-    **{name: REDUCTIONS[name] for name in ("mean", "max", "min", "end")},
-    "final": REDUCTIONS["end"],
-    "integral": lambda values, t: np.trapezoid(values, t, axis=-1),
-}
+NUMBERS = {name: number for name, number in REDUCTIONS.items() if name != "series"}
 
 
 class Objective:
@@ -165,7 +161,8 @@ def objective(
         scene: a Scene, or what ``load`` takes.
         by: names of parameters, as of ``sensitivities``.
         of: ``QUANTITY:NUMBER``: a quantity, or an expression of quantities as in ``[outputs]``;
-            and "final" (without a colon as well), "mean", "max", "min" or "integral" over time.
+            and "final" (without a colon as well), "mean", "rms", "max", "min" or "integral" over
+            time.
         settings: as of ``sensitivities``.
 
     Raises:

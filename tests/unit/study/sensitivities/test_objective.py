@@ -24,7 +24,7 @@ def oscillator():
 
 
 @pytest.mark.every(5)
-@pytest.mark.parametrize("number", ["final", "mean", "max", "min", "integral"])
+@pytest.mark.parametrize("number", ["final", "mean", "rms", "max", "min", "integral"])
 def test_gradients_are_those_of_differences(number):
     f = dap.objective(
         oscillator(), ["forces.spring.k", "forces.spring.c"], f"mass.r.x**2:{number}", **SETTINGS

@@ -17,7 +17,8 @@ from dap3d_core.study import Ensemble
 
 TIMES = {"t_end": 0.5, "dt": 0.1}
 VARY = {"bodies.block.mass": [0.5, 2.0], "forces.spring.k": "4:16:2"}
-OUTPUTS = ["block.r.x", "block.r.x:min", "block.r.x:series", "energy.kinetic:mean"]
+OUTPUTS = ["block.r.x", "block.r.x:min", "block.r.x:series", "energy.kinetic:mean",
+           "block.rd.x:rms", "block.r.x:integral"]  # fmt: skip
 
 
 def at(t, mass, k):
@@ -73,6 +74,9 @@ def test_numbers_are_those_of_single_runs_bit_for_bit(swept):
             assert found["block.r.x:min"] == x.min()
             mean = np.trapezoid(result.energy.kinetic, result.t) / TIMES["t_end"]
             assert found["energy.kinetic:mean"] == mean
+            square = np.trapezoid(result.rd[:, 0, 0] ** 2, result.t) / TIMES["t_end"]
+            assert found["block.rd.x:rms"] == np.sqrt(square)
+            assert found["block.r.x:integral"] == np.trapezoid(x, result.t)
 
 
 def test_the_data_set_says_what_it_is(swept):
@@ -81,6 +85,7 @@ def test_the_data_set_says_what_it_is(swept):
     assert swept["block.r.x:series"].dims == ("bodies.block.mass", "forces.spring.k", "time")
     assert swept["bodies.block.mass"].attrs["units"] == "kg"
     assert swept["forces.spring.k"].attrs["units"] == "N/m"
+    assert swept["block.r.x:integral"].attrs["units"] == "m s"
     assert swept["forces.spring.k"].values.tolist() == [4.0, 16.0]
     assert swept["block.r.x"].attrs == {"long_name": "position of block, x", "units": "m"}
     assert swept["time"].values == pytest.approx(np.arange(6) / 10)
