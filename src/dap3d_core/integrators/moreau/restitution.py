@@ -272,13 +272,22 @@ def put_behind(s: StepArrays) -> bool:
 
 @compiled
 def ask_for(s: StepArrays) -> None:
-    """Put biases by which the step has the normal velocities ``free`` of what rounds pushed."""
+    """Put biases by which the step has the velocities ``free`` of what rounds pushed.
+
+    The sums of the impulses of rounds are within the cones, which are convex: they solve that.
+    """
     for c in range(s.contact_count):
-        if s.takes[c] < 0 or s.kind[c] != CONE:
+        presses = c if s.kind[c] == CONE else s.under[c]
+        if s.takes[c] < 0 or presses < 0:
             continue
-        back, _, _ = velocity_of(s, c, s.free)
-        if s.x_bounce[c, 0] > 0.0 and back > 0.0:
-            s.collides[c], s.bias[c, 0] = BOUNCES, -back
+        back, along, across = velocity_of(s, c, s.free)
+        pushes = s.x_bounce[presses, 0] > 0.0
+        if pushes:
+            s.bias[c, 1], s.bias[c, 2] = -along, -across
+        if pushes and (back > 0.0 or s.kind[c] != CONE):
+            s.bias[c, 0] = -back
+        if s.kind[c] == CONE and pushes and back > 0.0:
+            s.collides[c] = BOUNCES
         elif is_hit(s, c):
             s.collides[c] = STOPS
 
@@ -334,8 +343,10 @@ def limit_bounces(s: StepArrays, tolerance: float) -> bool:
         copy(s.v_bounce[b], s.v[b])
     copy_impulses(s.x, s.y, s.x_bounce, s.y_bounce, s.contact_count)
     for c in range(s.contact_count):
-        if s.collides[c] == BOUNCES:
+        if s.collides[c] == BOUNCES or s.kind[c] != CONE:
             s.bias[c, 0] = 0.0
+        if s.takes[c] == BEHIND:
+            s.bias[c, 1] = s.bias[c, 2] = 0.0
     if not solve(s, tolerance):
         return False
     put_work(s, WITHOUT, 0.0)
