@@ -21,7 +21,7 @@ from dap3d_core.formulations.contacts.equations import (
     STATE,
     UNDER,
 )
-from dap3d_core.integrators.moreau.arrays import ALONE, CONE, STAYS, StepArrays
+from dap3d_core.integrators.moreau.arrays import ALONE, BOUNCES, CONE, STAYS, STOPS, StepArrays
 from dap3d_core.interface.contacts.rows import FAR_APART, SLIDES, STEPPED
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.array_struct import pointer
@@ -76,11 +76,14 @@ def find_contacts(
 
 
 @compiled
-def turn_rows(t: float, y: Floats, s: StepArrays, system: System, loops: Any) -> bool:
-    """Take rows of what stays closed, and of joints, halfway through the step; False without room.
+def turn_rows(t: float, y: Floats, hits: bool, s: StepArrays, system: System, loops: Any) -> bool:
+    """Take rows of contacts and of joints later in the step; False without room.
+
+    Of what stays closed halfway through it, or of what collides at its instant.
 
     Args:
         t, y: time and integrated state there.
+        hits: rows are of what collides.
         s: ``end`` has the velocities expected at the end of the step.
     """
     shapes, first = s.shapes, s.touch_count
@@ -91,13 +94,18 @@ def turn_rows(t: float, y: Floats, s: StepArrays, system: System, loops: Any) ->
         place_shapes(shapes, s.poses, s.margin)
     last = first
     for c in range(s.law_count):
-        copy(s.moved[c], s.J[c])
+        turns = s.collides[c] == STAYS
+        if hits:
+            presses = s.under[c] if s.under[c] >= 0 else c
+            turns = s.collides[presses] == STOPS or s.collides[presses] == BOUNCES
+        else:
+            copy(s.moved[c], s.J[c])
         if c >= first:
-            if s.kind[c] != CONE or s.collides[c] == STAYS:
+            if turns or (s.kind[c] != CONE and not hits):
                 put_rows(c, s, system)
                 for i in range(12, 36 if s.under[c] >= 0 else 12):  # as in find_grips
                     s.J[c, i] *= s.grip[s.key[c] - DECLARED]
-        elif s.collides[c] == STAYS:
+        elif turns:
             i, j = shapes.which[c, 0], shapes.which[c, 1]
             if last == first or shapes.which[first, 0] != i or shapes.which[first, 1] != j:
                 last = touch(shapes, i, j, first)
@@ -107,7 +115,7 @@ def turn_rows(t: float, y: Floats, s: StepArrays, system: System, loops: Any) ->
             for q in range(first, last):
                 if shapes.which[q, 2] == shapes.which[c, 2]:
                     turn_touch(c, shapes.found[q], s)
-        if s.collides[c] == STAYS:
+        if turns and not hits:
             put_turned_bias(c, s)
     return True
 

@@ -124,6 +124,32 @@ def add_pushed(pushed: Floats, y: Floats, slope: Floats) -> None:
 
 
 @compiled
+def put_middle(work: Any, s: StepArrays) -> Floats:
+    """The state halfway to that expected at the end of the step."""
+    y, trial, size = work.state[Y], work.state[TRIAL], work.state.shape[1]
+    middle = s.slopes[:size]
+    for i in range(size):
+        middle[i] = 0.5 * (y[i] + trial[i])
+    for b in range(1, s.end.shape[0]):
+        normalise(middle, coordinate_offset(b) + 3)
+    return middle
+
+
+@compiled
+def put_struck(work: Any, s: StepArrays) -> Floats:
+    """The state in which bodies that are hit are where they are then; others at the start."""
+    y, trial, struck = work.state[Y], work.state[TRIAL], s.slopes[: work.state.shape[1]]
+    copy(struck, y)
+    for b in range(1, s.end.shape[0]):
+        first = coordinate_offset(b)
+        if s.hit[b] <= 1.0:
+            for k in range(first, first + 7):
+                struck[k] += s.hit[b] * (trial[k] - y[k])
+            normalise(struck, first + 3)
+    return struck
+
+
+@compiled
 def normalise(y: Floats, c: int) -> None:
     """Make Euler parameters at c those of unit length."""
     a, b, d, e = y[c], y[c + 1], y[c + 2], y[c + 3]

@@ -39,8 +39,8 @@ STRUCK, SPARED, ELASTIC = range(3)
 #: Columns of ``strike``: what a normal velocity changes by until the gap closes, m/s; the bias of
 #: the step.
 FALLEN, WAS = range(2)
-#: The turn of contacts behind several rounds.
-BEHIND = ROUNDS + 1
+#: The turn of contacts behind several rounds; times coefficients where velocities are known.
+BEHIND, WIDER = ROUNDS + 1, 2.0
 #: Work that is rounding, as a part of what is exchanged.
 GAIN_ROUNDING = 1e-12
 #: Gaps, m of a scene of ordinary size, below which overlaps are left.
@@ -69,9 +69,7 @@ def put_bias(s: StepArrays, memory: Floats) -> bool:
         if approach < -COLLIDES * change and gap + s.h * min(approach, normal) < 0.0:
             normal = expected_of(s, c, approach, normal, change, memory)
             s.closing[c] = closing_of(gap, s.h * approach, s.h * (normal - approach))
-            s.strike[c, FALLEN] = s.closing[c] * (normal - approach)
-            last = 1.0 - s.closing[c]
-            back = last * (normal - approach) - s.e[c] * (normal - last * (normal - approach))
+            back = put_strike(s, c, approach, normal)
             if s.e[c] > 0.0 and back > 0.0:
                 s.collides[c], bias[0], found = BOUNCES, -back, True
             elif gap + s.h * approach < 0.0:  # what it falls by meanwhile is borne
@@ -85,6 +83,27 @@ def put_bias(s: StepArrays, memory: Floats) -> bool:
             last = max(1.0 - first, SHORT)
             s.bias[c, 0] = max(s.gap[c] + first * s.h * approach, 0.0) / (last * s.h)
     return found
+
+
+@compiled
+def put_strike(s: StepArrays, c: int, approach: float, normal: float) -> float:
+    """Put what a normal velocity falls by until the gap closes; that at the end, bounced, m/s."""
+    s.strike[c, FALLEN] = s.closing[c] * (normal - approach)
+    more = (1.0 - s.closing[c]) * (normal - approach)
+    return more - s.e[c] * (normal - more)
+
+
+@compiled
+def renew_bias(s: StepArrays, memory: Floats) -> None:
+    """Put what is added to normal velocities of what bounces, by rows at its instant."""
+    fall = fall_of(s)
+    for c in range(s.contact_count):
+        if s.collides[c] == BOUNCES:
+            approach, _, _ = velocity_of(s, c, s.before)
+            normal, _, _ = velocity_of(s, c, s.free)
+            change = max(fall, abs(normal - approach))
+            normal = expected_of(s, c, approach, normal, change, memory)
+            s.bias[c, 0] = -max(put_strike(s, c, approach, normal), 0.0)
 
 
 @compiled
@@ -302,6 +321,17 @@ def recall_rounds(s: StepArrays) -> None:
     for k in range(s.y.size):
         if s.flies[root_of(s.parent, s.row_owner[k])] == 0.0:
             s.y[k] = s.y_bounce[k]
+
+
+@compiled
+def widen(s: StepArrays, part: float) -> None:
+    """Multiply coefficients of friction of what rounds pushed.
+
+    Velocities are known then; on the rim of its cone the problem has its solutions at a kink.
+    """
+    for c in range(s.contact_count):
+        if s.takes[c] == BEHIND:
+            s.mu[c] *= part
 
 
 # ------------------------------------------------------------------ bounces

@@ -184,11 +184,8 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         work.t_stop, work.status, s.stage = work.t, at.DRIVEN, 0
         return False
     turns = stay_closed(work, s)
-    if turns:
-        if not contact_set.turn_rows(work.t + 0.5 * s.h, put_middle(work, s), s, system, loops):
-            return False
-    elif s.declared_gap.size == 0 and s.y.size > 0:
-        contact_set.evaluate_rows(work.t, y, False, s, system, loops)
+    if not turn_contacts(work, s, any_collides, turns, system, loops):
+        return False
     for c in range(s.touch_count if s.resistance_count > 0 else 0):
         contact_set.put_resistances(c, s)
     if passes_on:
@@ -211,6 +208,27 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
 
 
 @compiled
+def turn_contacts(
+    work: Any, s: StepArrays, any_collides: bool, turns: bool, system: System, loops: Any
+) -> bool:
+    """Take rows of what collides at its instant, others halfway if any turns; False without room.
+
+    Normals of the start of the step made oblique impacts of the first order.
+    """
+    if any_collides:
+        struck = free_motion.put_struck(work, s)
+        if not contact_set.turn_rows(work.t, struck, True, s, system, loops):
+            return False
+        restitution.renew_bias(s, work.memory)
+    if turns:
+        t, middle = work.t + 0.5 * s.h, free_motion.put_middle(work, s)
+        return contact_set.turn_rows(t, middle, False, s, system, loops)
+    if not any_collides and s.declared_gap.size == 0 and s.y.size > 0:
+        contact_set.evaluate_rows(work.t, work.state[at.Y], False, s, system, loops)
+    return True
+
+
+@compiled
 def solve_fitted(
     work: Any, s: StepArrays, turns: bool, passes_on: bool, system: System, loops: Any
 ) -> bool:
@@ -226,7 +244,12 @@ def solve_fitted(
         restitution.recall_rounds(s)
     while True:
         prepare_problem(s)
-        if not solve(s, work.rtol):
+        if passes_on:
+            restitution.widen(s, restitution.WIDER)
+        has_room = solve(s, work.rtol)
+        if passes_on:
+            restitution.widen(s, 1.0 / restitution.WIDER)
+        if not has_room:
             return False
         if not impulses.let_slip(s):
             if s.residual <= work.rtol or left == 0:
@@ -354,18 +377,6 @@ def is_pushed(work: Any, b: int) -> bool:
 def speed_at(s: StepArrays, b: int) -> float:
     """How fast a body moves, m/s, its turning at the length of the scene."""
     return length_of(s.end[b], 0) + s.length * length_of(s.end[b], 3)
-
-
-@compiled
-def put_middle(work: Any, s: StepArrays) -> Floats:
-    """The state halfway to that expected at the end of the step."""
-    y, trial, size = work.state[at.Y], work.state[at.TRIAL], work.state.shape[1]
-    middle = s.slopes[:size]
-    for i in range(size):
-        middle[i] = 0.5 * (y[i] + trial[i])
-    for b in range(1, s.end.shape[0]):
-        free_motion.normalise(middle, coordinate_offset(b) + 3)
-    return middle
 
 
 @compiled
