@@ -21,8 +21,9 @@ from dap3d_core.native.beside import Module, compile_modules
 from dap3d_core.native.c_source import CalledUnit, symbols_of
 from dap3d_core.native.run.prepared import refusal
 
-#: Compiler options; nothing is contracted, for the bits of plain arithmetic.
-OPTIONS = ("-std=c11", "-O2", "-ffp-contract=off", "-fvisibility=hidden")
+#: Compiler options; nothing is contracted, for the bits of plain arithmetic. Without -g0 zig adds
+#: symbols for a debugger, with the path of a temporary folder: each build would differ.
+OPTIONS = ("-std=c11", "-O2", "-g0", "-ffp-contract=off", "-fvisibility=hidden")
 #: Attributes of functions in LLVM IR that are compiled for size; without loss of bits.
 SMALL = " nounwind minsize optsize"
 #: Lines of LLVM IR from which on a unit, which is the steps of contacts, is optimised at a lower
