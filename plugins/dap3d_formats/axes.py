@@ -1,9 +1,10 @@
 """Axes of joints and shapes."""
 
+from collections.abc import Sequence
 from math import atan2, pi
 from typing import Any
 
-from dap3d_core.interface.formats import FormatError, XmlElement, axis_angle
+from dap3d_core.interface.formats import FormatError, XmlElement, axis_angle, from_quaternion
 
 
 def unit(axis: tuple[float, ...], element: XmlElement) -> tuple[float, ...]:
@@ -16,6 +17,18 @@ def unit(axis: tuple[float, ...], element: XmlElement) -> tuple[float, ...]:
     if not length > 0.0:
         raise FormatError("an axis needs a direction; its length is 0", element.place)
     return axis if sorted(map(abs, axis)) == [0.0, 0.0, 1.0] else tuple(x / length for x in axis)
+
+
+def turn(quaternion: Sequence[float], element: XmlElement) -> Any:
+    """The rotation of a quaternion w, x, y, z of an element.
+
+    Raises:
+        FormatError: its length is 0.
+    """
+    try:
+        return from_quaternion(quaternion)
+    except ValueError as error:
+        raise FormatError(str(error), element.place) from None
 
 
 def across(normal: tuple[float, ...]) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -6,7 +6,7 @@ the reason. What is NOTED or MOVES is left out, an element with all that it hold
 MOVES the motion is another. A key ``name=value`` is of an attribute with this value alone.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 
 from dap3d_core.interface.formats import FormatError, Remarks, XmlElement
@@ -32,15 +32,36 @@ moves = partial(_row, MOVES)
 refused = partial(_row, REFUSED)
 
 
-def note_elements(root: XmlElement, table: Table, remarks: Remarks) -> None:
+def first_counts(*repeatable: str) -> Callable[[str, str], Word]:
+    """The word for a further element, but for those that may be repeated."""
+
+    def further(parent: str, name: str) -> Word:
+        if name in repeatable:
+            return TAKEN, ""
+        return NOTED if parent in ("visual", "material") else MOVES, "the first counts"
+
+    return further
+
+
+def note_elements(
+    root: XmlElement, table: Table, remarks: Remarks,
+    further: Callable[[str, str], Word] = first_counts(),
+) -> None:  # fmt: skip
     """Remark what of a file is left out: what the table says so of, and what it does not know.
+
+    Args:
+        root: of the file.
+        table: see above.
+        remarks: is added to.
+        further: the word for an element that its parent has another of before, by their names.
 
     Raises:
         FormatError: something is refused.
     """
-    stack = [(root, "")]
+    stack: list[tuple[XmlElement, XmlElement | None]] = [(root, None)]
     while stack:
-        element, parent = stack.pop()
+        element, holder = stack.pop()
+        parent = holder.name if holder else ""
         key = f"{parent}/{element.name}" if f"{parent}/{element.name}" in table else element.name
         row = table.get(key)
         if row is None:
@@ -48,12 +69,18 @@ def note_elements(root: XmlElement, table: Table, remarks: Remarks) -> None:
             continue
         if _is_left_out(row.get("", (TAKEN, "")), f"<{element.name}>", element, remarks):
             continue
+        if holder is not None:  # a <geometry> holds one shape, whatever its name
+            first = holder.children[0] if parent == "geometry" else holder.first(element.name)
+        if holder is not None and first is not element:
+            word = further(parent, element.name)
+            if _is_left_out(word, f"a further <{element.name}> of <{parent}>", element, remarks):
+                continue
         for name, value in element.attributes.items():
             if not name.startswith("xmlns") and ":" not in name:
                 usual = row.get(name, (NOTED, "an unknown attribute"))
                 word = row.get(f"{name}={value.strip()}", usual)
                 _is_left_out(word, f"{name} of <{element.name}>", element, remarks)
-        stack += [(child, element.name) for child in reversed(element.children)]
+        stack += [(child, element) for child in reversed(element.children)]
 
 
 def _is_left_out(word: Word, label: str, element: XmlElement, remarks: Remarks) -> bool:

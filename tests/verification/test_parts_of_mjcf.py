@@ -162,9 +162,18 @@ def test_what_an_element_has_of_a_class_in_parts(tmp_path):
     ('<default><joint limited="1"/></default>', "limited of <joint> = '1' should be auto or true"),
     ('<default><geom mass="-3"/></default>', "mass of <geom> = -3 should be 0 or more"),
     ('<default><geom density="-3"/></default>', "density of <geom> = -3 should be 0 or more"),
+    ('<default><joint/><joint damping="1"/></default>', "a further <joint> of <default>: MuJoCo"),
+    ('<worldbody><site name="s"/><site name="s"/></worldbody>', "there are two of <site> 's'"),
+    ('<worldbody><body name="s"/><body name="s"/></worldbody>', "there are two of <body> 's'"),
+    ('<worldbody><body><inertial mass="-1" pos="0 0 0"/></body></worldbody>',
+     "mass of <inertial> = '-1' should be a finite number, 0 or more"),
+    ('<worldbody><body><inertial mass="1" diaginertia="1 -1 1"/></body></worldbody>',
+     "diaginertia of <inertial> = '1 -1 1' should be 3 finite numbers, 0 or more"),
+    ('<worldbody><body><joint name="j"/><geom size="1"/></body></worldbody><actuator>'
+     '<motor joint="j" ctrlrange="1 -1"/></actuator>', "ctrlrange of <motor>: 1 lies above -1"),
 ])  # fmt: skip
 def test_words_and_masses_that_mean_nothing_are_refused(tmp_path, text, message):
-    """They were read as the default: degrees, no limit, the mass of water."""
+    """They were read as the default: degrees, no limit, the mass of water; MuJoCo refuses them."""
     body = '<worldbody><body><joint range="-1 1"/><geom size="0.1"/></body></worldbody>'
     with pytest.raises(dap.SceneError, match=message):
         imported(tmp_path / "a.xml", text + body)

@@ -19,7 +19,7 @@ MOON = "<gravity>0 0 -1.6</gravity>"
 PHYSICS = f"<physics type='ode'>{MOON}</physics>"
 
 #: Link -> its <gravity>.
-GRAVITY = {"floats": "false", "falls": "true", "drops": 1}
+GRAVITY = {"floats": "False", "falls": "true", "drops": 1}
 
 
 def imported(folder, text, **options):
@@ -196,6 +196,81 @@ def test_inertials_of_meshes_need_their_files(tmp_path):
     body = scene.bodies["a"]
     assert_allclose([body.mass, *body.r], [2000.0, 2.0, 0.5, 0.5], rtol=1e-14)
     assert_allclose(body.Jp, 2000.0 / 12.0 * np.array([2.0, 5.0, 5.0]), rtol=1e-13)
-    for shape, words in (("<cone/>", "the mass of a <cone> is not"), ("", "without a volume")):
+    for shape, words in (("<plane/>", "the mass of a <plane> is not"), ("", "without a volume")):
         with pytest.raises(dap.SceneError, match=words):
             imported(tmp_path, AUTO % ("", TIP % shape))
+
+
+def test_the_mass_centre_of_a_cone_lies_a_quarter_of_its_length_above_its_base(tmp_path):
+    """Its frame is at half its length, with the tip along z; turned upside down here."""
+    cone = "<cone><radius>0.3</radius><length>0.8</length></cone>"
+    collision = (TIP % cone).replace("1 0 0 0 0 0", f"0 0 2 {2.0 * float(QUARTER)} 0 0")
+    scene, report = imported(tmp_path, AUTO % ("", collision), contacts=True)
+    (body,) = scene.bodies.values()
+    mass = 1000.0 * np.pi * 0.09 * 0.8 / 3.0
+    assert body.mass == pytest.approx(mass, rel=1e-14)
+    assert_allclose(body.r, [0.0, 0.0, 2.2], atol=1e-15)
+    assert_allclose(body.Jp, mass * np.diag([0.0375, 0.0375, 0.027]), rtol=1e-13, atol=1e-14)
+    assert [(one.motion, one.text) for one in report.left_out] == [
+        (True, "a shape cone meets no others")
+    ]
+
+
+#: A hinge, of which words are replaced below.
+WORDS = """<sdf version="1.11"><model name="m"><static>false</static>
+<pose degrees="false" rotation_format="euler_rpy">0 0 1 0 0 90</pose>
+<link name="a"><gravity>true</gravity><inertial auto="false"><mass>2</mass></inertial></link>
+<link name="b"><pose>1 0 0 0 0 0</pose></link>
+<joint name="j" type="revolute"><parent>a</parent><child>b</child><axis><limit>
+<stiffness>9</stiffness></limit><dynamics><damping>3</damping><friction>1</friction></dynamics>
+</axis></joint></model></sdf>"""
+
+
+@pytest.mark.parametrize(("old", "new", "message"), [
+    ("<static>false", "<static>yes", "1: <static> = 'yes' should be true, false, 1 or 0"),
+    ("<static>false", "<static>", "1: <static> = '' should be true, false, 1 or 0"),
+    ("<gravity>true", "<gravity>2", "3: <gravity> = '2' should be true, false, 1 or 0"),
+    ('auto="false"', 'auto="no"', "3: auto of <inertial> = 'no' should be true, false, 1 or 0"),
+    ('degrees="false"', 'degrees="on"', "2: degrees of <pose> = 'on' should be true, false"),
+    ("euler_rpy", "quat_wxyz", "2: rotation_format of <pose> = 'quat_wxyz' should be euler_rpy"),
+    ("0 0 90", "0 0 90 1", "2: <pose> = '0 0 1 0 0 90 1' should be 6 finite numbers"),
+    ('false" rotation_format="euler_rpy">0', 'true" rotation_format="quat_xyzw">0 0',
+     'should be euler_rpy, or quat_xyzw without degrees="true"'),
+    ('rotation_format="euler_rpy">0 0 1 0 0 90', 'rotation_format="quat_xyzw">0 0 0 0 0 0 0',
+     "2: a quaternion of length 0 is no rotation"),
+    (">2</mass>", ">2_0</mass>", "3: <mass> = '2_0' should be a finite number, 0 or more"),
+    (">2</mass>", ">2 kg</mass>", "3: <mass> = '2 kg' should be a finite number"),
+    (">2</mass>", ">-2</mass>", "3: <mass> = '-2' should be a finite number, 0 or more"),
+    (">9</", ">-9</", "6: <stiffness> = '-9' should be a number, 0 or more"),
+    (">3</", ">-3</", "6: <damping> = '-3' should be a finite number, 0 or more"),
+    (">1</", ">-1</", "6: <friction> = '-1' should be a finite number, 0 or more"),
+])  # fmt: skip
+def test_words_that_mean_nothing_are_refused_with_their_line(tmp_path, old, new, message):
+    """They were read as false, as radians, as no limit, as a damper that drives."""
+    assert WORDS.count(old) == 1
+    with pytest.raises(dap.SceneError, match=message):
+        imported(tmp_path, WORDS.replace(old, new))
+
+
+def test_booleans_may_have_capitals(tmp_path):
+    """As the library of the format reads them: a static model is ground, 90 is in degrees."""
+    with pytest.raises(dap.SceneError, match="no link of the model moves"):
+        imported(tmp_path, WORDS.replace("<static>false", "<static> True "))
+    scene, _ = imported(tmp_path, WORDS.replace('degrees="false"', 'degrees="TRUE"'))
+    assert_allclose(scene.bodies["b"].r, [0.0, 1.0, 1.0], atol=1e-15)
+
+
+def test_of_elements_that_the_format_has_once_the_first_counts(tmp_path):
+    """Alike ones and others, of numbers and of what holds them; the report names the lines."""
+    text = WORDS.replace("</mass>", "</mass>\n<mass>5</mass>")
+    text = text.replace("</damping>", "</damping>\n<damping>4</damping>")
+    ball = "<visual name='v'><geometry><sphere><radius>1</radius></sphere><box/></geometry></visual>"
+    scene, report = imported(tmp_path, text.replace("</inertial>", f"</inertial>{ball}"))
+    assert scene.bodies["a"].mass == 2.0
+    assert [force.fields["c"] for force in scene.forces.values() if "c" in force.fields] == [3.0]
+    assert [str(one) for one in report.left_out] == [
+        "a.sdf:4: a further <mass> of <inertial>: the first counts",
+        "a.sdf:4: a further <box> of <geometry>: the first counts",
+        "a.sdf:8: a further <damping> of <dynamics>: the first counts",
+    ]
+    assert [one.motion for one in report.left_out] == [True, True, True]

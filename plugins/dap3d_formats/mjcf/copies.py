@@ -9,7 +9,7 @@ import numpy as np
 from dap3d_core.interface.formats import WORLD, FormatError, Source, XmlElement, quaternion
 from dap3d_formats.element_table import note_elements
 from dap3d_formats.mjcf.document import Document
-from dap3d_formats.mjcf.elements import CONTACTS, MJCF
+from dap3d_formats.mjcf.elements import CONTACTS, MJCF, further
 from dap3d_formats.mjcf.keyframes import keys_of_part
 
 #: Elements of all copies of a file beyond which it is refused.
@@ -39,18 +39,31 @@ def read_document(source: Source) -> Document:
     Raises:
         FormatError: it cannot be read.
     """
-    return _read(source, source.xml(), source.path.parent, {})
+    document = _read(source, source.xml(), source.path.parent, {})
+    _require_names(document.root)
+    return document
 
 
 def _read(source: Source, root: XmlElement, folder: Path, models: dict[Path, Document]) -> Document:
     """A document; models: those that have been read, by file."""
     document = Document.of(source, root, folder)
-    note_elements(root, CONTACTS if source.contacts else MJCF, source.remarks)
+    note_elements(root, CONTACTS if source.contacts else MJCF, source.remarks, further)
     copier = _Copier(document, models)
     for world in root.all("worldbody"):
         copier.attach(world)
     copier.expand(root)
     return document
+
+
+def _require_names(root: XmlElement) -> None:
+    """Refuse two elements of a kind and name."""
+    known: set[tuple[str, str]] = set()
+    for kind, element in _elements_named(root):
+        key = kind, element.attributes["name"]
+        if key in known:
+            what = f"there are two of <{kind}> {key[1]!r}"
+            raise FormatError(what, element.place, "give one of them another name")
+        known.add(key)
 
 
 @attrs.define
@@ -224,11 +237,16 @@ def _references(element: XmlElement) -> set[tuple[str, str]]:
 
 def _named(element: XmlElement) -> Iterator[tuple[str, str]]:
     """The kinds and names of all elements below one."""
+    return ((kind, one.attributes["name"]) for kind, one in _elements_named(element))
+
+
+def _elements_named(element: XmlElement) -> Iterator[tuple[str, XmlElement]]:
+    """The kinds of all elements with a name below one, and these elements."""
     for child in element:
         if "name" in child.attributes:
             kind = element.name if element.name in NAMING else child.name.removeprefix("free")
-            yield kind, child.attributes["name"]
-        yield from _named(child)
+            yield kind, child
+        yield from _elements_named(child)
 
 
 def _size(element: XmlElement) -> int:

@@ -20,9 +20,8 @@ from dap3d_core.interface.formats import (
     XmlElement,
     axis_angle,
     euler_angles,
-    from_quaternion,
 )
-from dap3d_formats.axes import along, cross, unit
+from dap3d_formats.axes import along, cross, turn, unit
 
 #: Elements that share the defaults of actuators.
 ACTUATORS = (
@@ -197,6 +196,9 @@ class Document:
             holds = self.compiler(element).get("autolimits", "true")
         if holds == "true":
             low, high = element.numbers(key, 2, unbounded=True)
+            if low > high:
+                what = f"{key} of <{element.name}>: {low:g} lies above {high:g}"
+                raise FormatError(what, element.place, "give the lower one first")
             return low, high
         return UNBOUNDED
 
@@ -212,10 +214,7 @@ class Document:
         """The rotation of an element."""
         given = element.attributes
         if "quat" in given:
-            try:
-                return from_quaternion(element.numbers("quat", 4))
-            except ValueError as error:
-                raise FormatError(str(error), element.place) from None
+            return turn(element.numbers("quat", 4), element)
         if "axisangle" in given:
             x, y, z, angle = element.numbers("axisangle", 4)
             return axis_angle(unit((x, y, z), element), self.angle(angle, element))

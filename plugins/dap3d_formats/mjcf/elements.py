@@ -1,6 +1,16 @@
 """Elements and attributes of MJCF, and what becomes of them."""
 
-from dap3d_formats.element_table import Table, moves, noted, refused, taken, translated
+from dap3d_formats.element_table import (
+    REFUSED,
+    TAKEN,
+    Table,
+    Word,
+    moves,
+    noted,
+    refused,
+    taken,
+    translated,
+)
 
 _SOLVER = "settings of a solver"
 _CONTACT = "contact properties; bodies do not touch each other"
@@ -176,3 +186,9 @@ CONTACTS: Table = {
     "pair": taken("name class geom1 geom2 condim friction")
     | moves("solref solimp solreffriction margin gap", "contacts are rigid"),
 }  # fmt: skip
+
+
+def further(parent: str, name: str) -> Word:
+    """What becomes of an element that its parent has another of before."""
+    once = name == "inertial" or (parent == "default" and name != "default")
+    return (REFUSED, "MuJoCo takes one") if once else (TAKEN, "")

@@ -13,12 +13,11 @@ from dap3d_core.interface.formats import (
     Inertial,
     Remarks,
     XmlElement,
-    from_quaternion,
     inertia_moved,
     inertia_of_mesh,
     inertia_of_solid,
 )
-from dap3d_formats.axes import along
+from dap3d_formats.axes import along, turn
 from dap3d_formats.element_table import NO_CONTACTS
 from dap3d_formats.mjcf.document import Document
 from dap3d_formats.shapes import hexadecimal
@@ -289,4 +288,4 @@ def _hull(vertices: Any, asset: XmlElement) -> Any:
 def _reference(asset: XmlElement) -> Frame:
     """The frame of a mesh in its file, before it is scaled."""
     q = asset.numbers("refquat", 4, (1.0, 0.0, 0.0, 0.0))
-    return Frame(asset.numbers("refpos", 3, (0.0, 0.0, 0.0)), from_quaternion(q))
+    return Frame(asset.numbers("refpos", 3, (0.0, 0.0, 0.0)), turn(q, asset))

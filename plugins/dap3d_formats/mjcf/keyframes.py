@@ -10,7 +10,8 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.formats import FormatError, Frame, XmlElement, from_quaternion
+from dap3d_core.interface.formats import FormatError, Frame, XmlElement
+from dap3d_formats.axes import turn
 from dap3d_formats.mjcf.document import ACTUATORS, Document
 from dap3d_formats.mjcf.reader import MjcfReader
 
@@ -68,7 +69,9 @@ class Keyframe:
                          for k, key in enumerate(("mpos", "mquat")))  # fmt: skip
         for name in mocap:
             joint = next(one for one in model.joints.values() if one.child == name)
-            A = from_quaternion(turns[name]) if name in turns else joint.in_parent.A
+            A = joint.in_parent.A
+            if name in turns and self.element is not None:
+                A = turn(turns[name], self.element)
             joint.in_parent = Frame(places.get(name, joint.in_parent.r), A)
 
     def controls(self, elements: list[XmlElement], states: list[bool]) -> list[tuple[float, float]]:

@@ -162,8 +162,8 @@ class MjcfReader:
     def _body(self, element: XmlElement, parent: str, frame: Frame, outer: str) -> None:
         document, model = self.document, self.model
         name = element.get("name") or self._free_link(f"body{len(model.links) + 1}")
-        if name in model.links or name == WORLD:
-            raise FormatError(f"there are two bodies {name}", element.place)
+        if name == WORLD:
+            raise FormatError("a body named world is the one that does not move", element.place)
         childclass = element.get("childclass") or outer
         if element.get("mocap") == "true":
             self.mocap[name] = element.scope
@@ -207,8 +207,8 @@ class MjcfReader:
             xx, yy, zz, xy, xz, yz = element.numbers("fullinertia", 6)
             J: Any = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         else:
-            J = np.diag(element.numbers("diaginertia", 3, (0.0, 0.0, 0.0)))
-        return Inertial(element.number("mass"), frame.r, frame.A @ J @ frame.A.T)
+            J = np.diag(element.numbers("diaginertia", 3, (0.0, 0.0, 0.0), least=0.0))
+        return Inertial(element.number("mass", least=0.0), frame.r, frame.A @ J @ frame.A.T)
 
     def _join(
         self, body: XmlElement, link: Link, parent: str, here: Frame,
@@ -260,8 +260,6 @@ class MjcfReader:
             raise FormatError(f"a joint of type {type_!r} is unknown; one of {', '.join(KINDS)}",
                               element.place)  # fmt: skip
         name = element.get("name") or self._free(f"joint{len(self.model.joints) + 1}")
-        if name in self.joints:
-            raise FormatError(f"there are two joints {name}", element.place)
         self.joints[name] = element.scope
         anchor = frame @ Frame(element.numbers("pos", 3, (0.0, 0.0, 0.0)))
         if KINDS[type_] == "ball":  # its coordinates are in the axes of the body

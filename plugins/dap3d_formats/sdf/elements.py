@@ -1,6 +1,6 @@
 """Elements and attributes of SDF, and what becomes of them."""
 
-from dap3d_formats.element_table import Table, moves, noted, taken, translated
+from dap3d_formats.element_table import Table, first_counts, moves, noted, taken, translated
 
 _SIMULATOR = "settings of a simulator"
 _CONTACT = "contact properties; bodies do not touch each other"
@@ -28,7 +28,7 @@ SDF: Table = {
     | translated("name", "shapes are named after their link"),
     "geometry": taken(),
     "box": taken(), "size": taken(), "sphere": taken(), "cylinder": taken(), "capsule": taken(),
-    "ellipsoid": noted("", "ellipsoids are not drawn"),
+    "ellipsoid": taken(), "radii": taken(), "cone": taken(),
     "radius": taken(), "length": taken(), "scale": taken(),
     "mesh": taken() | noted("optimization", "for contacts"),
     "convex_decomposition": noted("", "for contacts"),
@@ -39,7 +39,6 @@ SDF: Table = {
     "heightmap": noted("", "height maps are not drawn"),
     "polyline": noted("", "polylines are not drawn"),
     "image": noted("", "images are not drawn"),
-    "cone": noted("", "not drawn"),
     "empty": taken(),
     "material": translated("", "its diffuse colour"),
     "diffuse": taken(),
@@ -92,10 +91,14 @@ SDF: Table = {
     "fluid_added_mass": moves("", "added mass of a fluid"),
 }  # fmt: skip
 
+#: What becomes of elements that the format has once, as its library reads them.
+FURTHER = first_counts("model", "include", "link", "joint", "frame", "visual", "collision")
+
 #: Where shapes are to meet each other.
 CONTACTS: Table = {
     **SDF,
     "plane": taken(), "normal": taken(),
+    **dict.fromkeys(("heightmap", "polyline", "image"), moves("", "not drawn, and meet no others")),
     "surface": taken(), "surface/friction": taken(), "friction/ode": taken(), "mu": taken(),
     **dict.fromkeys(("mu2", "fdir1", "slip1", "slip2"),
                     moves("", "friction is that of mu in all directions")),

@@ -183,8 +183,8 @@ def _limits(axis: XmlElement, joint: str) -> Limits:
     limit = axis.first("limit")
     if limit is None:
         return Limits()
-    values = values_of(limit, "lower", "upper", "stiffness", unbounded=True)
-    stiffness = values.get("stiffness", RIGID)
+    values = values_of(limit, "lower", "upper", unbounded=True)
+    stiffness = values_of(limit, "stiffness", unbounded=True, least=0.0).get("stiffness", RIGID)
     return Limits.between(
         values.get("lower", -inf), values.get("upper", inf), joint, limit.place,
         stiffness if 0.0 < stiffness < RIGID else None,
@@ -192,8 +192,10 @@ def _limits(axis: XmlElement, joint: str) -> Limits:
 
 
 def _dynamics(axis: XmlElement) -> dict[str, float]:
-    used = ("damping", "friction", "spring_stiffness", "spring_reference")
-    return dict.fromkeys(used, 0.0) | values_of(axis.first("dynamics"), *used)
+    losses, spring = ("damping", "friction"), ("spring_stiffness", "spring_reference")
+    given = axis.first("dynamics")
+    found = values_of(given, *losses, least=0.0) | values_of(given, *spring)
+    return dict.fromkeys((*losses, *spring), 0.0) | found
 
 
 def _mimic(reader: SdfReader, joint: Joint, axis: XmlElement, scope: str) -> None:

@@ -1,8 +1,8 @@
 """Reads links, frames, nested and included models of SDF."""
 
 import re
-from collections.abc import Sequence
 from itertools import chain, combinations
+from math import inf
 from typing import Any
 
 from dap3d_core.interface.formats import (
@@ -19,16 +19,15 @@ from dap3d_core.interface.formats import (
     Remarks,
     Source,
     XmlElement,
-    from_quaternion,
     inertia_moved,
     inertia_of_mesh,
     inertia_of_solid,
     rpy,
     total_inertia,
 )
-from dap3d_formats.axes import along
+from dap3d_formats.axes import along, turn
 from dap3d_formats.element_table import note_elements
-from dap3d_formats.sdf.elements import CONTACTS, SDF
+from dap3d_formats.sdf.elements import CONTACTS, FURTHER, SDF
 from dap3d_formats.sdf.frames import FrameGraph
 from dap3d_formats.sdf.versions import update, version_of
 from dap3d_formats.shapes import SIZES, add_shapes, hexadecimal
@@ -36,7 +35,11 @@ from dap3d_formats.shapes import SIZES, add_shapes, hexadecimal
 #: Speed below which nothing bounces from which on nothing ever does, m/s: the default is 1e5.
 FAST = 1e3
 #: Kinds of solids, and names of their sizes.
-SOLIDS = SIZES | {"ellipsoid": {"radii": 3}}
+SOLIDS = SIZES | {"ellipsoid": {"radii": 3}, "cone": {"radius": 1, "length": 1}}
+#: Words of a boolean, in any case of their letters.
+BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
+#: Value of rotation_format -> count of the numbers of a pose.
+POSES = {"euler_rpy": 6, "quat_xyzw": 7}
 #: Density of collisions of which none is given, kg/m^3.
 WATER = 1000.0
 #: The address of a model on Gazebo's server; its name.
@@ -95,7 +98,8 @@ class SdfReader:
     def _prepare(self, root: XmlElement) -> None:
         """Bring a file to the newest version, and remark what of it is left out."""
         update(root, self.remarks)
-        note_elements(root, CONTACTS if self.source.contacts else SDF, self.remarks)
+        table = CONTACTS if self.source.contacts else SDF
+        note_elements(root, table, self.remarks, FURTHER)
 
     def finish(self) -> Articulation:
         """The model; links that no joint places are where the file has them."""
@@ -125,7 +129,7 @@ class SdfReader:
             if child is not None:
                 inner.children = [c for c in inner.children if c.name != tag] + [child]
         scope = scoped(outer or "", called) if scope is None else scope
-        if outer is not None and element.get("merge") in ("true", "1"):
+        if outer is not None and boolean(element, "merge"):
             scope = MergedScope(outer)
             scope.frame = f"_merged__{called}__model__"
         with self.source.including(file):
@@ -215,8 +219,7 @@ class SdfReader:
         self.frames.add(name, scoped(scope, relative or "__model__"), pose, element.place)
         link = Link(name, place=element.place)
         link.inertial = self._inertial(element)
-        if text_of(element, "gravity") in ("false", "0"):
-            link.gravcomp = 1.0
+        link.gravcomp = 0.0 if is_true(element, "gravity", usual=True) else 1.0
         if is_true(element, "self_collide"):
             self.self_collide.add(name)
         add_shapes(link, element, self.source, self._geometry)
@@ -228,28 +231,30 @@ class SdfReader:
         if element is None:
             self.remarks.translate(link.place, "a link without <inertial> has 1 kg and 1 kg m^2")
             return Inertial(1.0, inertia=[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-        if element.get("auto") in ("true", "1"):
+        if boolean(element, "auto"):
             return self._computed_inertial(link, element)
-        mass, inertia = element.first("mass"), element.first("inertia")
+        inertia = element.first("inertia")
         pose, _ = self.pose(element)
         usual = {"ixx": 1.0, "iyy": 1.0, "izz": 1.0, "ixy": 0.0, "ixz": 0.0, "iyz": 0.0}
         v = usual | values_of(inertia, *usual)
         rows = [[v["ixx"], v["ixy"], v["ixz"]], [v["ixy"], v["iyy"], v["iyz"]],
                 [v["ixz"], v["iyz"], v["izz"]]]  # fmt: skip
-        return Inertial(
-            1.0 if mass is None else mass.content(1)[0], pose.r, pose.A @ rows @ pose.A.T
-        )
+        return Inertial(numbers(element, "mass", 1, (1.0,), least=0.0)[0], pose.r,
+                        pose.A @ rows @ pose.A.T)  # fmt: skip
 
     def _computed_inertial(self, link: XmlElement, element: XmlElement) -> Inertial:
         """The inertial of the volumes of a link's collisions, with its mass where that is given."""
-        usual, parts = numbers(element, "density", 1, (WATER,)), []
+        usual, parts = numbers(element, "density", 1, (WATER,), least=0.0), []
         for collision in link.all("collision"):
             shape = next(iter(collision.first("geometry") or ()), None)
             if shape is None:
                 continue
             com: Any = (0.0, 0.0, 0.0)
             if shape.name in SOLIDS:
-                volume, unit_inertia = inertia_of_solid(shape.name, _sizes(shape))
+                sizes = _sizes(shape)
+                volume, unit_inertia = inertia_of_solid(shape.name, sizes)
+                if shape.name == "cone":  # its middle is that of its height, its tip along z
+                    com = (0.0, 0.0, -0.25 * sizes[1])
             elif shape.name == "mesh":
                 path = self.source.locate(text_of(shape, "uri"), shape.place, required=True)
                 assert path is not None
@@ -259,13 +264,13 @@ class SdfReader:
             else:
                 what = f"the mass of a <{shape.name}> is not computed"
                 raise FormatError(what, shape.place, "give mass and inertia to its link")
-            mass = abs(volume) * numbers(collision, "density", 1, usual)[0]
+            mass = abs(volume) * numbers(collision, "density", 1, usual, least=0.0)[0]
             part = Inertial(mass, com, mass * unit_inertia)
             parts.append(inertia_moved(part, self.pose(collision)[0]))
         total = total_inertia(parts) if parts else Inertial(0.0)
         if not total.mass > 0.0:
             raise FormatError('<inertial auto="true"> of a link without a volume', element.place)
-        ratio = numbers(element, "mass", 1, (total.mass,))[0] / total.mass
+        ratio = numbers(element, "mass", 1, (total.mass,), least=0.0)[0] / total.mass
         return Inertial(ratio * total.mass, total.com, ratio * total.inertia)
 
     def _geometry(
@@ -293,17 +298,23 @@ class SdfReader:
     def pose(self, element: XmlElement) -> tuple[Frame, str]:
         """The pose of an element, and the name of the frame that it is given in, or ""."""
         pose = element.first("pose")
-        if pose is None or not pose.text.strip():
-            return Frame(), "" if pose is None else pose.get("relative_to") or ""
-        relative = pose.get("relative_to") or ""
-        if pose.get("rotation_format") == "quat_xyzw":
-            x, y, z, qx, qy, qz, qw = pose.content(7)
-            return Frame((x, y, z), from_quaternion((qw, qx, qy, qz))), relative
-        values = pose.content(6)
-        angles: Sequence[float] = values[3:]
-        if pose.get("degrees") in ("true", "1"):
+        if pose is None:
+            return Frame(), ""
+        relative, in_degrees = pose.get("relative_to") or "", boolean(pose, "degrees")
+        rotation_format = pose.get("rotation_format") or "euler_rpy"
+        if rotation_format not in POSES or (in_degrees and rotation_format == "quat_xyzw"):
+            what = f"rotation_format of <pose> = {rotation_format!r} should be euler_rpy, or "
+            what += 'quat_xyzw without degrees="true"'
+            raise FormatError(what, pose.place)
+        if not pose.text.strip():
+            return Frame(), relative
+        x, y, z, *angles = pose.content(POSES[rotation_format])
+        if rotation_format == "quat_xyzw":
+            qx, qy, qz, qw = angles
+            return Frame((x, y, z), turn((qw, qx, qy, qz), pose)), relative
+        if in_degrees:
             angles = [angle * 3.141592653589793 / 180.0 for angle in angles]
-        return Frame(values[:3], rpy(angles)), relative
+        return Frame((x, y, z), rpy(angles)), relative
 
 
 def scoped(scope: str, name: str) -> str:
@@ -319,20 +330,45 @@ def text_of(element: XmlElement, name: str) -> str:
     return "" if child is None else child.text.strip()
 
 
-def is_true(element: XmlElement, name: str) -> bool:
-    """True where a child says so."""
-    return text_of(element, name) in ("true", "1")
+def is_true(element: XmlElement, name: str, *, usual: bool = False) -> bool:
+    """The boolean in a child.
+
+    Raises:
+        FormatError: it is none.
+    """
+    child = element.first(name)
+    return usual if child is None else _boolean(child.text, f"<{name}>", child.place)
 
 
-def values_of(element: XmlElement | None, *names: str, unbounded: bool = False) -> dict[str, float]:
+def boolean(element: XmlElement, key: str) -> bool:
+    """A boolean attribute, by default False.
+
+    Raises:
+        FormatError: it is none.
+    """
+    return _boolean(element.get(key, "false"), f"{key} of <{element.name}>", element.place)
+
+
+def _boolean(text: str | None, label: str, place: Place) -> bool:
+    word = (text or "").strip()
+    if word.lower() not in BOOLEANS:
+        raise FormatError(f"{label} = {word!r} should be true, false, 1 or 0", place)
+    return BOOLEANS[word.lower()]
+
+
+def values_of(
+    element: XmlElement | None, *names: str, unbounded: bool = False, least: float = -inf
+) -> dict[str, float]:
     """The numbers in children of some names, as far as they are there."""
-    children = [child for child in element or () if child.name in names]
-    return {child.name: child.content(1, unbounded=unbounded)[0] for child in children}
+    children = [element.first(name) for name in names] if element is not None else []
+    return {child.name: child.content(1, unbounded=unbounded, least=least)[0]
+            for child in children if child is not None}  # fmt: skip
 
 
 def numbers(
-    element: XmlElement, name: str, count: int, default: tuple[float, ...] = ()
-) -> tuple[float, ...]:
+    element: XmlElement, name: str, count: int, default: tuple[float, ...] = (), *,
+    least: float = -inf,
+) -> tuple[float, ...]:  # fmt: skip
     """The numbers in a child.
 
     Raises:
@@ -343,7 +379,7 @@ def numbers(
         if default:
             return default
         raise FormatError(f"<{element.name}> has no <{name}>; it is required", element.place)
-    return child.content(count)
+    return child.content(count, least=least)
 
 
 def _sizes(shape: XmlElement) -> tuple[float, ...]:
@@ -376,5 +412,5 @@ def _color(material: XmlElement | None) -> str:
     diffuse = None if material is None else material.first("diffuse")
     if diffuse is None:
         return ""
-    r, g, b, *_ = (*diffuse.content(), 0.0, 0.0, 0.0)
+    r, g, b, *_ = diffuse.content(3 if len(diffuse.text.split()) < 4 else 4)
     return hexadecimal((r, g, b))

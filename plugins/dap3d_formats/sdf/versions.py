@@ -43,10 +43,10 @@ def version_of(element: XmlElement) -> tuple[int, ...]:
         FormatError: it is no numbers.
     """
     given = element.get("version") or "1.7"
-    try:
-        return tuple(int(part) for part in given.split("."))
-    except ValueError:
-        raise FormatError(f"version {given!r} is no version", element.place) from None
+    parts = given.split(".")
+    if not all(part.isdecimal() for part in parts):
+        raise FormatError(f"version {given!r} is no version", element.place)
+    return tuple(map(int, parts))
 
 
 def _below(root: XmlElement) -> Iterator[XmlElement]:

@@ -1,6 +1,14 @@
 """Elements and attributes of URDF, and what becomes of them."""
 
-from dap3d_formats.element_table import Table, moves, noted, taken, translated
+from dap3d_formats.element_table import (
+    Table,
+    first_counts,
+    moves,
+    noted,
+    refused,
+    taken,
+    translated,
+)
 
 _CONTACT = "contact properties; bodies do not touch each other"
 
@@ -8,7 +16,8 @@ URDF: Table = {
     "robot": taken("name") | noted("version", "the version of the format"),
     "link": taken("name") | noted("type", "the type of a link has no effect"),
     "inertial": taken(),
-    "origin": taken("xyz rpy"),
+    "origin": taken("xyz rpy quat_xyzw")
+    | refused("rotation_format", "SDF has it; give rpy, or quat_xyzw in version 1.1"),
     "mass": taken("value"),
     "inertia": taken("ixx ixy ixz iyy iyz izz"),
     "visual": taken() | translated("name", "shapes are named after their link"),
@@ -40,7 +49,7 @@ URDF: Table = {
     "calibration": noted("", "reference positions of encoders"),
     "safety_controller": noted("", "limits of a controller"),
     "constraint": translated("", "a joint that closes a loop") | taken("name type"),
-    "child_origin": taken("xyz rpy"),
+    "child_origin": taken("xyz rpy quat_xyzw"),
     "loop_joint": moves("", "closes a loop; <constraint> is read"),
     "drake:joint": moves("", "types of Drake; its links hang from nothing"),
     "transmission": moves("", "motors and gears; add forces of your own"),
@@ -49,3 +58,6 @@ URDF: Table = {
     "sensor": noted("", "sensors"),
     "mujoco": noted("", "settings of a compiler"),
 }  # fmt: skip
+
+#: What becomes of elements that the format has once, as its library reads them.
+FURTHER = first_counts("link", "joint", "material", "visual", "collision", "constraint")

@@ -21,10 +21,10 @@ from dap3d_core.interface.formats import (
     balanced_inertia,
     rpy,
 )
-from dap3d_formats.axes import across, unit
+from dap3d_formats.axes import across, turn, unit
 from dap3d_formats.element_table import note_elements
 from dap3d_formats.shapes import SIZES, add_shapes, hexadecimal
-from dap3d_formats.urdf.elements import URDF
+from dap3d_formats.urdf.elements import FURTHER, URDF
 
 #: Type of a joint -> kind of a joint.
 KINDS = {
@@ -44,7 +44,7 @@ class UrdfReader:
         self.balances = any(one.get("balanceinertia") == "true" for one in compilers)
 
     def read(self) -> Articulation:
-        note_elements(self.root, URDF, self.remarks)
+        note_elements(self.root, URDF, self.remarks, FURTHER)
         for element in self.root.all("material"):
             self._color(element)
         for element in self.root.all("link"):
@@ -91,14 +91,21 @@ class UrdfReader:
         matrix = frame.A @ [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]] @ frame.A.T
         if self.balances:
             matrix = balanced_inertia(matrix)
-        return Inertial(mass.number("value"), frame.r, matrix)
+        return Inertial(mass.number("value", least=0.0), frame.r, matrix)
 
     def _origin(self, element: XmlElement, tag: str = "origin") -> Frame:
         origin = element.first(tag)
         if origin is None:
             return Frame()
         zero = (0.0, 0.0, 0.0)
-        return Frame(origin.numbers("xyz", 3, zero), rpy(origin.numbers("rpy", 3, zero)))
+        r, angles = origin.numbers("xyz", 3, zero), origin.numbers("rpy", 3, zero)
+        if "quat_xyzw" not in origin.attributes:
+            return Frame(r, rpy(angles))
+        if self.root.get("version", "1.0") in ("1", "1.0") or "rpy" in origin.attributes:
+            what = f"quat_xyzw of <{tag}> is of version 1.1 and later, and takes the place of rpy"
+            raise FormatError(what, origin.place, '<robot version="1.1">, without rpy')
+        x, y, z, w = origin.numbers("quat_xyzw", 4)
+        return Frame(r, turn((w, x, y, z), origin))
 
     def _geometry(
         self, element: XmlElement, shape: XmlElement | None, collision: bool
@@ -170,8 +177,8 @@ class UrdfReader:
     def _dynamics(self, joint: Joint, element: XmlElement, *, limited: bool) -> None:
         dynamics, limit = element.first("dynamics"), element.first("limit")
         if dynamics is not None:
-            joint.damping = (dynamics.number("damping", 0.0),)
-            joint.friction = (dynamics.number("friction", 0.0),)
+            joint.damping = (dynamics.number("damping", 0.0, least=0.0),)
+            joint.friction = (dynamics.number("friction", 0.0, least=0.0),)
         if limited and limit is None:
             raise FormatError(f"joint {joint.name} has no <limit>; it is required", joint.place)
         if limit is not None and limited:

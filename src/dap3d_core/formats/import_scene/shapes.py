@@ -216,7 +216,7 @@ def _shapes(
     """Keyword and fields of the shapes that draw a geometry."""
     at, z = float_tuple(frame.r), frame.A[:, 2]
     if shape.size and min(shape.size) <= 0.0:
-        _leave_out(builder, shape, "a shape of size 0")
+        _leave_out(builder, shape, "a shape of size 0 or less")
         return []
     if shape.kind == "plane":
         return [("plane", {"at": at, "normal": float_tuple(z)})]

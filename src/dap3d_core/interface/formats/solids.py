@@ -11,11 +11,12 @@ from dap3d_core.kernels.array_types import Floats, Integers
 
 
 def inertia_of_solid(kind: str, size: Sequence[float]) -> tuple[float, Floats]:
-    """Volume, and inertia about the centre for a mass of 1, of a solid.
+    """Volume, and inertia about the mass centre for a mass of 1, of a solid.
 
     Args:
-        kind: box, sphere, cylinder, capsule or ellipsoid.
-        size: as of ``Geometry``.
+        kind: box, sphere, cylinder, capsule, ellipsoid or cone.
+        size: as of ``Geometry``; radius and length of a cone along z, whose mass centre lies a
+            quarter of the length above its base.
 
     Raises:
         ValueError: there is no such kind.
@@ -31,6 +32,10 @@ def inertia_of_solid(kind: str, size: Sequence[float]) -> tuple[float, Floats]:
         r, length = size
         across = r * r / 4.0 + length * length / 12.0
         return pi * r * r * length, np.diag([across, across, r * r / 2.0])
+    if kind == "cone":
+        r, length = size
+        across = 3.0 / 80.0 * (4.0 * r * r + length * length)
+        return pi * r * r * length / 3.0, np.diag([across, across, 0.3 * r * r])
     if kind == "capsule":
         return _capsule(*size)
     raise ValueError(f"no solid is of kind {kind}")

@@ -64,63 +64,75 @@ class XmlElement:
             raise FormatError(f"<{self.name}> has no {key}; it is required", self.place)
         return value
 
-    def number(self, key: str, default: float | None = None, *, unbounded: bool = False) -> float:
+    def number(
+        self, key: str, default: float | None = None, *,
+        unbounded: bool = False, least: float = -math.inf,
+    ) -> float:  # fmt: skip
         """An attribute that is a number.
 
         Args:
             key: the attribute.
             default: where it is missing.
             unbounded: it may be infinite, or the largest number of a program, as limits are.
+            least: the least that is allowed.
 
         Raises:
-            FormatError: it is no finite number, or missing without a default.
+            FormatError: it is no finite number, below the least, or missing without a default.
         """
         if default is not None and key not in self.attributes:
             return default
-        return self.numbers(key, 1, unbounded=unbounded)[0]
+        return self.numbers(key, 1, unbounded=unbounded, least=least)[0]
 
     def numbers(
-        self, key: str, count: int | None = None, default: Any = None, *, unbounded: bool = False
-    ) -> tuple[float, ...]:
+        self, key: str, count: int | None = None, default: Any = None, *,
+        unbounded: bool = False, least: float = -math.inf,
+    ) -> tuple[float, ...]:  # fmt: skip
         """An attribute of several numbers, separated by spaces.
 
         Raises:
-            FormatError: they are not ``count`` finite numbers, or missing without a default.
+            FormatError: they are not ``count`` finite numbers, one is below the least, or they are
+                missing without a default.
         """
         if default is not None and key not in self.attributes:
             return tuple(default)
         label = f"{key} of <{self.name}>"
-        return numbers_in(self.require(key), label, self.place, count, unbounded=unbounded)
+        return _numbers_in(self.require(key), label, self.place, count, unbounded, least)
 
-    def content(self, count: int | None = None, *, unbounded: bool = False) -> tuple[float, ...]:
+    def content(
+        self, count: int | None = None, *, unbounded: bool = False, least: float = -math.inf
+    ) -> tuple[float, ...]:
         """The numbers in its text.
 
         Raises:
-            FormatError: they are not ``count`` finite numbers.
+            FormatError: they are not ``count`` finite numbers, or one is below the least.
         """
-        return numbers_in(self.text, f"<{self.name}>", self.place, count, unbounded=unbounded)
+        return _numbers_in(self.text, f"<{self.name}>", self.place, count, unbounded, least)
 
 
-def numbers_in(
-    text: str, label: str, place: Place, count: int | None, *, unbounded: bool = False
+def _numbers_in(
+    text: str, label: str, place: Place, count: int | None, unbounded: bool, least: float
 ) -> tuple[float, ...]:
     """Numbers separated by spaces.
 
     Raises:
-        FormatError: they are not ``count`` numbers, finite ones unless ``unbounded``.
+        FormatError: they are not ``count`` numbers, finite ones unless ``unbounded``, or one is
+            below the least.
     """
     try:
         values = tuple(map(float, text.split()))
     except ValueError:
         values = (math.nan,)
     largest = math.inf if unbounded else LARGEST
-    if (count is not None and len(values) != count) or not all(abs(x) <= largest for x in values):
+    # Python takes 1_000 for a number; no format does
+    known = "_" not in text and all(abs(x) <= largest for x in values)
+    if not known or len(values) != (count or len(values)) or min(values, default=least) < least:
         finite = "" if unbounded else "finite "
         wanted = {None: f"{finite}numbers", 1: f"a {finite}number"}.get(
             count, f"{count} {finite}numbers"
         )
+        bound = "" if least == -math.inf else f", {least:g} or more"
         shown = text.strip() if len(text) <= 60 else f"{text.strip()[:56]} ..."
-        raise FormatError(f"{label} = {shown!r} should be {wanted}", place)
+        raise FormatError(f"{label} = {shown!r} should be {wanted}{bound}", place)
     return values
 
 

@@ -33,6 +33,8 @@ def test_a_mesh_of_a_box_is_the_box(all_positive):
         ("cylinder", (0.6, 1.76), lambda p: (np.hypot(*p.T[:2]) <= 0.6) & (abs(p.T[2]) <= 0.88)),
         ("capsule", (0.6, 1.2), lambda p: np.linalg.norm(
             p - np.clip(p, (0, 0, -0.6), (0, 0, 0.6)), axis=1) <= 0.6),
+        ("cone", (0.9, 2.08), lambda p: (np.hypot(*p.T[:2]) <= 0.9 * (1.56 - p.T[2]) / 2.08)
+         & (p.T[2] >= -0.52)),
     ],
 )  # fmt: skip
 def test_solids_against_sums_over_points(kind, size, inside):
