@@ -197,8 +197,8 @@ class Document:
         if holds == "true":
             low, high = element.numbers(key, 2, unbounded=True)
             if low > high:
-                what = f"{key} of <{element.name}>: {low:g} lies above {high:g}"
-                raise FormatError(what, element.place, "give the lower one first")
+                what = f"{key} of <{element.name}>: lower = {low:g} lies above upper = {high:g}"
+                raise FormatError(what, element.place)
             return low, high
         return UNBOUNDED
 
