@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 
@@ -190,3 +192,59 @@ def test_bounds_of_mass_and_inertia_hold_by_themselves(tmp_path, bound, mass, mo
                         f"<joint/>{ball}</body></worldbody>")  # fmt: skip
     assert scene.bodies["a"].mass == mass
     assert scene.bodies["a"].Jp[0] == pytest.approx(moment, rel=1e-15)
+
+
+#: A cart on three slides, an arm of several joints a body, and its hand, which the world holds.
+HELD_ARM = """<default><joint armature="0.1"/><geom type="capsule" size="0.05"/></default>
+<worldbody><body name="cart"><joint type="slide" axis="1 0 0"/>
+<joint type="slide" axis="0 1 0"/><joint type="slide"/><geom type="box" size="0.1 0.1 0.1"/>
+<body name="upper"><joint axis="1 0 0"/><joint axis="0 -1 0"/><joint axis="0 0 1"/>
+<geom fromto="0 0 0 0 0 -0.3"/>
+<body name="fore" pos="0 0 -0.3"><joint axis="0 -1 0"/><joint axis="-1 0 0"/>
+<geom fromto="0 0 0 0.2 0 0"/>
+<body name="hand" pos="0.25 0 0"><joint/><joint axis="0 -1 0"/>
+<geom fromto="0 0.02 0 0 -0.02 0"/></body></body></body></body></worldbody>
+<equality><weld body1="hand"/></equality>"""
+
+
+def fall_of_held_arm(bodies, t_end):
+    """Positions of upper arm and cart, along x and z, by the angles of the fore and upper arms.
+
+    Each body is at w + alpha u + beta d, of the directions u and d of the arms, from the wrist w.
+    """
+    terms = {"fore": (-0.15, 0.0), "upper": (-0.25, -0.15), "cart": (-0.25, -0.3)}
+    inertias = (np.array(bodies[name].Jp) for name in ("fore", "upper"))
+    about_y = [J[1] if J.ndim == 1 else J[1, 1] for J in inertias]
+    turns = np.array([[1.0, 0.0], [-1.0, 1.0], [0.0, 1.0]])  # of wrist, elbow, shoulder
+
+    def rates(t, y):
+        (a, b), w = y[:2], y[2:]
+        u, d = np.array([np.cos(a), -np.sin(a)]), np.array([-np.sin(b), -np.cos(b)])
+        du, dd = np.array([-np.sin(a), -np.cos(a)]), np.array([-np.cos(b), np.sin(b)])
+        M = 0.1 * turns.T @ turns + np.diag(about_y)
+        right = np.zeros(2)
+        for name, (alpha, beta) in terms.items():
+            J, weighed = np.stack([alpha * du, beta * dd], axis=1), bodies[name].mass
+            moved = weighed + (0.1 if name == "cart" else 0.0)  # the armature of the slides
+            M += moved * J.T @ J
+            right += J.T @ (moved * (alpha * u * w[0] ** 2 + beta * d * w[1] ** 2))
+            right -= J.T @ np.array([0.0, 9.81 * weighed])
+        return [*w, *np.linalg.solve(M, right)]
+
+    a, b = solve_ivp(rates, (0.0, t_end), np.zeros(4), "DOP853", rtol=1e-11, atol=1e-13).y[:2, -1]
+    u, d = np.array([np.cos(a), -np.sin(a)]), np.array([-np.sin(b), -np.cos(b)])
+    return [np.array([0.25, -0.3]) + terms[n][0] * u + terms[n][1] * d for n in ("upper", "cart")]
+
+
+@long_in_plain_python
+def test_a_loop_through_links_without_mass_is_cut_at_bodies(tmp_path):
+    """Cut at the shoulder, which has two links without mass, the run stopped at once.
+
+    Links between the joints of a body have 1e-11 of its mass; both integrations hold 1e-9.
+    """
+    scene, _ = imported(tmp_path / "a.xml", HELD_ARM)
+    result = dap.simulate(scene, t_end=0.3, dt=0.1, rtol=1e-9)
+    places = fall_of_held_arm(scene.bodies, 0.3)
+    for name, place in zip(("upper", "cart"), places, strict=True):
+        found = result.quantity(f"{name}.r").values[-1]
+        assert found == pytest.approx([place[0], 0.0, place[1]], abs=1e-8)

@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 
 #: A note says where right-hand sides take more than this time of method standard.
 COSTLY = 1.2
+#: Bodies of less than this part of the largest mass have next to none: stand-ins of imported links.
+LIGHT = 1e-9
 #: Joints that words name; elementary motions of a joint at most.
 MOST_NAMES, MOST_PARTS = 5, 8
 #: Quantities of the segments of a state, as in tolerances.
@@ -305,7 +307,8 @@ def _tree_and_reasons(model: Model) -> tuple[ModelMotions, SpanningForest, dict[
         else:
             bodies = zip(group.body_i.tolist(), group.body_j.tolist(), strict=True)
             ends |= zip(joints, bodies, strict=True)
-    tree = spanning_forest(model.body_count, ends, model.joint_rows.tolist())
+    light = 1 + np.flatnonzero(model.mass < LIGHT * model.mass.max(initial=0.0))
+    tree = spanning_forest(model.body_count, ends, model.joint_rows.tolist(), set(light.tolist()))
     reasons |= {cut.joint: cut.words(model.joint_names) for cut in tree.cuts}
     return motions, tree, dict(sorted(reasons.items()))
 

@@ -4,11 +4,12 @@ Where joints close loops one joint of each loop is cut: its rows are kept and so
 multipliers on the tree of the others. A kept row is a load that is carried from its two bodies to
 ground, and two of them couple where they meet on the way. So few rows want to be kept, near ground.
 Forests that keep the fewest rows and forests of the shortest ways are made, and the one of least
-work is taken (docs/decisions/0038).
+work is taken (docs/decisions/0038). No loop is cut at a body without mass if it can be helped: that
+would move freely under the row, and the matrix of kept rows lose all digits of the others.
 """
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from heapq import heappop, heappush
 
 import attrs
@@ -70,23 +71,25 @@ class SpanningForest:
 
 
 def spanning_forest(
-    body_count: int, ends: Mapping[int, tuple[int, int]], rows: Sequence[int]
-) -> SpanningForest:
+    body_count: int, ends: Mapping[int, tuple[int, int]], rows: Sequence[int],
+    light: Container[int] = (),
+) -> SpanningForest:  # fmt: skip
     """The forest of least work for its kept rows; of equal ones the one that keeps fewest rows.
 
     Args:
         body_count: number of bodies without ground.
         ends: the two bodies, ground 0, of each joint that may be in the forest, by its place.
         rows: number of rows of every joint of the model.
+        light: bodies next to no mass, whose joints are to be in the forest.
     """
     near: dict[int, list[tuple[int, int]]] = defaultdict(list)
     for joint, (a, b) in sorted(ends.items()):
         near[a].append((joint, b))
         near[b].append((joint, a))
-    few_rows = _Forest(body_count, ends, rows, near, shallow=False)
+    few_rows = _Forest(body_count, ends, rows, near, light, shallow=False)
     if len(few_rows.up) - few_rows.free == len(ends):  # there are no loops
         return few_rows.result()
-    short_ways = _Forest(body_count, ends, rows, near, shallow=True)
+    short_ways = _Forest(body_count, ends, rows, near, light, shallow=True)
     return min(few_rows.result(), short_ways.result(), key=lambda forest: forest.work)
 
 
@@ -106,6 +109,7 @@ class _Forest:
         ends: Mapping[int, tuple[int, int]],
         rows: Sequence[int],
         near: Mapping[int, list[tuple[int, int]]],
+        light: Container[int],
         *,
         shallow: bool,
     ) -> None:
@@ -113,7 +117,7 @@ class _Forest:
         self.up: dict[int, tuple[int, int]] = {}
         self.depth, self.branch = {0: 0}, {0: 0}
         self.free = 0
-        heap: list[tuple[int, int, int, int, int]] = []
+        heap: list[tuple[bool, int, int, int, int, int]] = []
 
         def add(body: int) -> None:
             level = self.depth[body] + 1
@@ -121,7 +125,8 @@ class _Forest:
                 if other not in self.depth:
                     first, second = -rows[joint], level
                     key = (second, first) if shallow else (first, second)
-                    heappush(heap, (*key, joint, body, other))
+                    is_heavy = body not in light and other not in light
+                    heappush(heap, (is_heavy, *key, joint, body, other))
 
         add(0)
         for root in range(body_count + 1):
@@ -130,7 +135,7 @@ class _Forest:
                 self.free += 1
                 add(root)
             while heap:
-                _, _, joint, parent, child = heappop(heap)
+                *_, joint, parent, child = heappop(heap)
                 if child not in self.depth:
                     self.up[child], self.depth[child] = (joint, parent), self.depth[parent] + 1
                     self.branch[child] = self.branch[parent] or child

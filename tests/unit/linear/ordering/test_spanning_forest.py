@@ -80,6 +80,15 @@ def test_a_four_bar_is_cut_at_the_joint_of_fewest_rows():
     assert cut.words(names) == "it closes a loop with follower, crank, cross"
 
 
+@pytest.mark.parametrize(("light", "cut"), [((), 2), ((2,), 3), ((3,), 1), ((1, 2, 3), 2)])
+def test_a_loop_is_not_cut_at_a_body_without_mass(light, cut):
+    """The four-bar of above, whose joint of fewest rows has bodies 2 and 3; the joint across from
+    a light body is cut, and where all are light that of fewest rows."""
+    ends = {0: (1, 0), 1: (2, 1), 2: (3, 2), 3: (3, 0)}
+    forest = spanning_forest(3, ends, [5, 4, 3, 5], light)
+    assert [one.joint for one in forest.cuts] == [cut]
+
+
 def test_a_ladder_is_cut_near_ground():
     """Cranks on ground, couplers between them: every row is carried over three bodies, not all.
     Work grows with the number of loops, as neighbours alone meet."""
