@@ -45,7 +45,7 @@ def first_counts(*repeatable: str) -> Callable[[str, str], Word]:
 
 def note_elements(
     root: XmlElement, table: Table, remarks: Remarks,
-    further: Callable[[str, str], Word] = first_counts(),
+    further: Callable[[str, str], Word],
 ) -> None:  # fmt: skip
     """Remark what of a file is left out: what the table says so of, and what it does not know.
 

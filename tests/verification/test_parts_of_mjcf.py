@@ -172,7 +172,8 @@ def test_what_an_element_has_of_a_class_in_parts(tmp_path):
     ('<worldbody><body><inertial mass="1" diaginertia="1 -1 1"/></body></worldbody>',
      "diaginertia of <inertial> = '1 -1 1' should be 3 finite numbers, 0 or more"),
     ('<worldbody><body><joint name="j"/><geom size="1"/></body></worldbody><actuator>'
-     '<motor joint="j" ctrlrange="1 -1"/></actuator>', "ctrlrange of <motor>: lower = 1 lies above upper = -1"),
+     '<motor joint="j" ctrlrange="1 -1"/></actuator>',
+     "ctrlrange of <motor>: lower = 1 lies above upper = -1"),
 ])  # fmt: skip
 def test_words_and_masses_that_mean_nothing_are_refused(tmp_path, text, message):
     """They were read as the default: degrees, no limit, the mass of water; MuJoCo refuses them."""

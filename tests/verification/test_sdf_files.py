@@ -264,7 +264,7 @@ def test_of_elements_that_the_format_has_once_the_first_counts(tmp_path):
     """Alike ones and others, of numbers and of what holds them; the report names the lines."""
     text = WORDS.replace("</mass>", "</mass>\n<mass>5</mass>")
     text = text.replace("</damping>", "</damping>\n<damping>4</damping>")
-    ball = "<visual name='v'><geometry><sphere><radius>1</radius></sphere><box/></geometry></visual>"
+    ball = "<visual><geometry><sphere><radius>1</radius></sphere><box/></geometry></visual>"
     scene, report = imported(tmp_path, text.replace("</inertial>", f"</inertial>{ball}"))
     assert scene.bodies["a"].mass == 2.0
     assert [force.fields["c"] for force in scene.forces.values() if "c" in force.fields] == [3.0]

@@ -12,7 +12,7 @@ from support.process import REPOSITORY
 
 import dap3d_core as dap
 from dap3d_formats.element_table import MOVES, NOTED, REFUSED, note_elements
-from dap3d_formats.mjcf.elements import MJCF
+from dap3d_formats.mjcf.elements import MJCF, further
 from dap3d_formats.sdf.elements import SDF
 from dap3d_formats.urdf.elements import URDF
 
@@ -82,12 +82,12 @@ def test_the_tables_do_what_they_say():
     """An unknown or noted element or attribute is remarked, a refused one ends the import."""
     text = '<mujoco><a/><sensor><b/></sensor><worldbody><body name="x" c="1"/></worldbody></mujoco>'
     remarks = Remarks()
-    note_elements(parse_xml(text, "x.xml"), MJCF, remarks)
+    note_elements(parse_xml(text, "x.xml"), MJCF, remarks, further)
     assert [one.text for one in remarks.left_out] == [
         "<a>: an unknown element", "<sensor>: sensors", "c of <body>: an unknown attribute",
     ]  # fmt: skip
     with pytest.raises(FormatError, match="composites are not expanded"):
-        note_elements(parse_xml("<mujoco><composite/></mujoco>", "x.xml"), MJCF, remarks)
+        note_elements(parse_xml("<mujoco><composite/></mujoco>", "x.xml"), MJCF, remarks, further)
 
 
 def reference(t, theta, rate):

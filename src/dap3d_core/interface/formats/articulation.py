@@ -56,8 +56,8 @@ class Geometry:
     Attributes:
         kind: box, sphere, cylinder, capsule, ellipsoid, cone, mesh, height_field, or plane, whose
             normal is z.
-        size: edges of a box; radius of a sphere; radius and length of a cylinder, a cone and (without
-            its caps) a capsule, along z; semi-axes of an ellipsoid.
+        size: edges of a box; radius of a sphere; radius and length of a cylinder, a cone and
+            (without its caps) a capsule, along z; semi-axes of an ellipsoid.
         pose: its frame in the link.
         mesh: path of the file of a mesh, as ``Source.locate`` returns it.
         scale: (3,) factors of a mesh.
