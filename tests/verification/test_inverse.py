@@ -113,3 +113,31 @@ def test_tensions_of_a_platform_are_those_of_newton_and_euler(number):
         for leg in range(number):
             spring = motion.force(f"leg{leg}").tension
             assert np.max(np.abs(result.force(f"leg{leg}").tension - spring)) < 1e-9
+
+
+def test_the_motion_of_a_run_has_its_states_and_inputs():
+    """A driven body that a spring and damper in series and a sampled input pull: D = m x'' - F - u,
+    with the damper's z' = a (e - z) in closed form. Its error is that of the run's states, 1e-10."""
+    k, c, X, w = 100.0, 20.0, 0.2, 5.0
+    scene = dap.Scene()
+    scene.add_body("b", mass=2.0, Jp=(1.0, 1.0, 1.0))
+    scene.add_point("wall", "ground", (1.5, 0.0, 0.0))
+    scene.add_joint("tran", "guide", P_i="b.O", P_j="ground.O", a_j="ground.x")
+    scene.add_force("maxwell", "leg", P_i="b.O", P_j="wall", k=k, c=c, l0=1.5)
+    scene.add_function("harmonic", "swing", amplitude=X, frequency=w)
+    scene.add_joint("drive-tran", "driver", joint="guide", function="swing")
+    scene.add_input("u")
+    scene.add_force("f", "pull", body_i="b", f=(1.0, 0.0, 0.0), input="u")
+    controller = dap.Controller(every=0.1, update=lambda t, state: {"u": 3.0 * t})
+    run = dap.simulate(scene, t_end=2.0, dt=0.1, rtol=1e-11, controllers=[controller])
+    result = dap.inverse(scene, run, "driver")
+    t, e = run.t, -X * np.sin(w * run.t)
+    size = -X * (k / c) / (k / c + 1j * w)
+    z = (size * np.exp(1j * w * t)).imag - size.imag * np.exp(-k / c * t)
+    u = 3.0 * np.minimum(np.round(t, 1), 1.9)  # a run takes no sample at its end
+    expected = -2.0 * X * w**2 * np.sin(w * t) - k * (e - z) - u
+    np.testing.assert_allclose(result.record.actuation["driver"], expected, rtol=0, atol=1e-8)
+    assert not any("initial values" in note for note in result.notes)
+    scene.add_force("maxwell", "other", P_i="b.O", P_j="wall", k=0.1, c=c, l0=1.5)
+    assert any("other.z" in note and "leg.z" not in note
+               for note in dap.inverse(scene, run, "driver").notes)  # fmt: skip

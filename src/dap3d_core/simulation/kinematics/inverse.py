@@ -137,7 +137,7 @@ def inverse(
     Args:
         scene: a Scene, what ``load`` takes, or a compiled model.
         motion: a ``Result`` with the same bodies, from which positions, velocities and
-            accelerations are taken; or positions over time: {"t": times, "platform.r.x": values},
+            accelerations are taken, and states of elements and inputs of the same names; or positions over time: {"t": times, "platform.r.x": values},
             a data frame, an xarray.Dataset or the path of a CSV file with a header, whose columns
             are quantities that positions determine (body.r.x, body.p.e1, point.r.z, force.length).
             The motion is the nearest to them, by least squares, that the joints allow; its rates
@@ -161,7 +161,7 @@ def inverse(
     given = read_motion(motion)
     compiled = compile_exact(scene, allow_code, announce)
     refuse_collisions(compiled.model, "inverse dynamics")
-    with compiled.borrow_evaluator() as evaluator:
+    with compiled.borrow_evaluator() as evaluator, evaluator.held_inputs():
         result = _solved(compiled, evaluator, given, actuators, progress)
     if output is not None:
         result.save(output, force=force)
@@ -241,10 +241,10 @@ def _solved(
     arrays = Arrays(
         motion.t.copy(), motion.u, motion.v_dot, forces.Lam, np.zeros(len(motion.t)),
         forces.potential, position, velocity, acceleration, forces.angles, forces.states,
-        np.tile(model.input_values, (len(motion.t), 1)),
+        motion.inputs,
     )  # fmt: skip
     notes = [*compiled.notes, *misfit_notes(motion.misfit), *_notes(evaluator, chosen, forces),
-             *held_states(model), *(contacts.notes() if contacts else [])]  # fmt: skip
+             *held_states(motion.held), *(contacts.notes() if contacts else [])]  # fmt: skip
     return result_of(
         compiled,
         arrays,
@@ -277,9 +277,11 @@ def _forces(
     layout = model.report_layout
     out = _Forces(np.zeros((count, len(actuators))), np.zeros((count, model.row_count)),
                   np.zeros(count), np.zeros((count, model.angle_count)), np.zeros((count, 3)),
-                  np.tile(evaluator.states, (count, 1)), rank=len(actuators),
+                  motion.states, rank=len(actuators),
                   idle=np.ones(len(actuators), dtype=bool))  # fmt: skip
     for k, (t, u, v_dot) in enumerate(zip(motion.t.tolist(), motion.u, motion.v_dot, strict=True)):
+        evaluator.states = motion.states[k]
+        evaluator.set_inputs(motion.inputs[k])
         if motion.angles is None:
             evaluator.count_turns(t, u)
         else:

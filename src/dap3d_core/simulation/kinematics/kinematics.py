@@ -32,7 +32,7 @@ from dap3d_core.simulation.kinematics.driver_coordinate import (
     read_coordinate,
 )
 from dap3d_core.simulation.kinematics.path import KinematicPath, PathEndError, Pose
-from dap3d_core.simulation.kinematics.pose_equations import held_states, required_forces
+from dap3d_core.simulation.kinematics.pose_equations import held_states, own_states, required_forces
 from dap3d_core.simulation.redundancy.freedoms import freedoms_left, motion_words
 from dap3d_core.simulation.redundancy.shared_reactions import refuse_shared, shared_laws
 from dap3d_core.simulation.settings import compile_exact, report_times, settings_of
@@ -276,7 +276,7 @@ class _Kinematics:
         settings, compiled = self.settings, self.compiled
         start = compiled.start(True, settings.hold, str(settings.correct_metric))
         self.notes += start_notes(start, self.evaluator, compiled.scene)
-        self.notes += held_states(compiled.model)
+        self.notes += held_states(own_states(compiled.model))
         redundancy = start.redundancy
         self.rank, words = redundancy.rank.rank, redundancy.describe()
         if redundancy.singular is not None:

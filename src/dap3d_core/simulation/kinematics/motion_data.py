@@ -5,7 +5,7 @@ on the constraints; splines through the positions give velocities and accelerati
 brought onto the rows of their levels by the least change.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.model.element_states import ElementState
 from dap3d_core.model.rotations import angular_velocities
 from dap3d_core.model.state_layout import join, split, velocities_of
 from dap3d_core.result import Result, RunMetadata
@@ -25,7 +26,7 @@ from dap3d_core.scene import MISSING, Mistake, SceneError
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.initial.assemble import max_speed
 from dap3d_core.simulation.initial.least_change import displaced
-from dap3d_core.simulation.kinematics.pose_equations import ChosenRows, Flags
+from dap3d_core.simulation.kinematics.pose_equations import ChosenRows, Flags, own_states
 from dap3d_core.simulation.redundancy.freedoms import coordinates_of
 
 #: Degree of the splines; the fewest instants, which a spline of degree 3 goes through.
@@ -55,13 +56,19 @@ class Motion:
         v_dot: (nt, 6 n) accelerations.
         misfit: quantity -> largest distance of the data from the motion, in its unit.
         angles: (nt, angles) that a run has counted, in the order of the model; None of data.
+        states: (nt, states) of elements: those of the run, else their initial values.
+        inputs: (nt, inputs) those of the run, else the values of the scene.
+        held: the states that keep their initial values.
     """
 
     t: Floats
     u: Floats
     v_dot: Floats
     misfit: dict[str, float]
-    angles: Floats | None = None
+    angles: Floats | None
+    states: Floats
+    inputs: Floats
+    held: list[ElementState]
 
 
 def read_motion(motion: Any) -> Result | MeasuredData:
@@ -112,9 +119,16 @@ def motion_on(
         SimulationError: the data leave freedoms of the scene open, or fit none of its poses.
     """
     angles: Floats | None = None
+    model, count = evaluator.model, len(given.t)
+    states, inputs = (np.tile(x, (count, 1)) for x in (model.initial_states, model.input_values))
+    held = own = own_states(model)
     if isinstance(given, Result):
         t, u, v_dot = given.t, *_states_of(evaluator, given)
         misfit: dict[str, float] = {}
+        labels = [label if s in own else "" for s in model.element_states for label in s.labels]
+        taken = _take(states, labels, given.arrays.states, given.summary.state_names)
+        _take(inputs, model.input_names, given.arrays.inputs, given.summary.input_names)
+        held = [s for s in own if not taken.issuperset(s.labels)]
         columns = [given.summary.angle_names.index(name) for name in evaluator.model.angle_names
                    if name in given.summary.angle_names]  # fmt: skip
         if len(columns) == evaluator.model.angle_count:
@@ -131,7 +145,17 @@ def motion_on(
     u, v_dot = u.copy(), v_dot.copy()
     for k, time in enumerate(t):
         u[k], v_dot[k] = _on_rows(evaluator, float(time), u[k], v_dot[k], chosen)
-    return Motion(t, u, v_dot, misfit, angles)
+    return Motion(t, u, v_dot, misfit, angles, states, inputs, held)
+
+
+def _take(
+    values: Floats, names: Sequence[str], given: Floats, given_names: Sequence[str]
+) -> set[str]:
+    """Put columns of the same names in ``values`` (nt, names); these names."""
+    taken = set(names) & set(given_names)
+    for name in taken:
+        values[:, names.index(name)] = given[:, given_names.index(name)]
+    return taken
 
 
 def differentiated(t: Floats, u: Floats) -> tuple[Floats, Floats]:

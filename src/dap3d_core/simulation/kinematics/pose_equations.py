@@ -1,5 +1,6 @@
 """The equations of a scene at one pose: its rows as linear maps, and what accelerations take."""
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -9,6 +10,7 @@ from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model
+from dap3d_core.model.element_states import ElementState
 from dap3d_core.model.rotations import to_body, to_global
 from dap3d_core.model.state_layout import split
 from dap3d_core.simulation.initial.least_change import finite_rows
@@ -169,10 +171,13 @@ def required_forces(evaluator: Evaluator, t: float, u: Floats, v_dot: Floats) ->
     return np.asarray((inertial - evaluator.applied_forces(t, u)).ravel())
 
 
-def held_states(model: Model) -> list[str]:
-    """Note that states of elements stay as they are; none where there are no states."""
-    own = [s.path for s in model.element_states if s.element not in model.contact_names]
-    if not own:
-        return []
-    names = ", ".join(own)
-    return [f"no motion is integrated: states of elements keep their initial values ({names})"]
+def own_states(model: Model) -> list[ElementState]:
+    """The states of elements that are no contacts: a motion alone does not tell them."""
+    return [s for s in model.element_states if s.element not in model.contact_names]
+
+
+def held_states(held: Sequence[ElementState]) -> list[str]:
+    """Note that these states of elements stay as they are; none where there are none."""
+    names = ", ".join(s.path for s in held)
+    words = f"no motion is integrated: states of elements keep their initial values ({names})"
+    return [words] if held else []
