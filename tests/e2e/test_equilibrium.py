@@ -16,6 +16,7 @@ def folder(dap3d):
     return dap3d.folder
 
 
+@pytest.mark.slow
 def test_the_command_prints_poses_and_reactions(dap3d, folder):
     done = dap3d.succeed("equilibrium", "toggle.toml", "-o", "rest.toml")
     for words in ("toggle: stable equilibrium", "1 degree of freedom", "slider", "1.21885",

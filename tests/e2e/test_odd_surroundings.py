@@ -27,7 +27,7 @@ def in_shell(words, folder, **variables):
     return found
 
 
-@pytest.mark.every(2)
+@pytest.mark.slow
 @has_full
 @pytest.mark.parametrize("option", ["", "--json"])
 def test_a_result_is_saved_though_its_words_are_lost(scene_file, option):

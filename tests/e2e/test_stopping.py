@@ -37,6 +37,7 @@ def test_signals_keep_what_was_computed(dap3d, number, code, status):
     assert list(result.t) == [float(k) for k in range(len(result.t))]  # no chunk is lost
 
 
+@pytest.mark.slow
 def test_an_interrupt_before_the_run_leaves_nothing(dap3d):
     """Ctrl-C while packages are still imported, some of which swallow it."""
     for name in ("click", "numpy", "dap3d_core.result"):

@@ -28,8 +28,6 @@ CONTROL = re.compile(r"\x1b\[[0-9;?]*[a-zA-Z]")
 
 def in_terminal(dap3d, width, *arguments, answers="", **variables):
     """Run a command in a terminal of some width; exit code and all that it shows."""
-    from tests.e2e.conftest import COMMAND, environment
-
     main, child = pty.openpty()
     fcntl.ioctl(child, termios.TIOCSWINSZ, struct.pack("HHHH", 40, width, 0, 0))
     process = subprocess.Popen(

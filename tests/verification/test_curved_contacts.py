@@ -129,6 +129,7 @@ def test_a_ball_slides_round_in_a_bowl():
     )
 
 
+@pytest.mark.slow
 def test_a_surface_may_move_and_be_below():
     """A ball falls on a rising dome: both seen from the dome, it falls by g t^2 / 2 + v t."""
     radius, v, gap = 0.1, 0.7, 0.3

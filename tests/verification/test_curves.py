@@ -269,6 +269,7 @@ def add_lines(x, y, **fields):
     return add
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("depth", [{"depth": 0.05}, {}])
 def test_a_pin_passes_behind_a_wall_with_a_depth(depth):
     """And another one bounces off its front; without it all behind a wall is in the way."""

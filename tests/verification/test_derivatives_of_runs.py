@@ -158,7 +158,7 @@ def test_dop853_takes_radau_across_a_singular_pose():
     close(*(run.of("crank0.r.x") for run in runs), part=1e-6)
 
 
-@pytest.mark.every(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["standard", "joint"])
 def test_a_pendulum_at_rest_that_is_pulled_ever_more(method):
     """By its rate at the start: q'' = -(a + b t) q, whose solutions are Airy's functions. Values of

@@ -27,8 +27,9 @@ MODELS = sorted(
 )
 INTEGRATORS = {"dop853": {}, "dopri5": {}, "adams": {}, "rk4": {"step": 1e-3}}
 #: Scenes whose programs branch with the motion: pivots among kept rows that depend on each other,
-#: the number of passes until forces on reactions settle.
-BRANCHING = {"A02-1", "A02-2", "A04", "planetary"}
+#: the number of passes until forces on reactions settle, or until lsq solves where masses differ
+#: much (A05).
+BRANCHING = {"A02-1", "A02-2", "A04", "A05", "planetary"}
 NAMES = ("r", "p", "rd", "w", "rdd", "wd", "Lam")
 
 

@@ -5,7 +5,6 @@ reports."""
 import attrs
 import numpy as np
 import pytest
-from support.results import without_turns
 
 import dap3d_core as dap
 
@@ -43,14 +42,6 @@ def test_a_spring_between_two_reports_winds_up(tmp_path):
     assert angles.dims == ("time", "angle")
     assert angles.attrs["units"] == "rad"
     np.testing.assert_allclose(angles[:, 0], -SPEED * np.sin(result.t), atol=1e-4)
-
-
-def test_a_file_of_an_older_program_has_no_turns_and_says_so(tmp_path):
-    result = dap.simulate(winding(), dt=0.02)  # less than half a turn between two
-    without_turns(result).save(tmp_path / "older.nc")
-    read = dap.open(tmp_path / "older.nc")
-    check(read)
-    assert sum("holds no turns" in note for note in read.notes) == 1
 
 
 def test_the_points_of_a_sweep_keep_their_turns():

@@ -317,9 +317,10 @@ class Model(Bodies):
 
         def fastest(t: float) -> float:
             wrench = forces(t)
-            moving = np.array([v, wrench[:, :3] / self.mass[:, None]]) / self.part_size
-            turning = np.array([w, wrench[:, 3:] / of_turning])
-            rates = np.linalg.norm([moving, turning], axis=-1).max(axis=(0, -1), initial=0.0)
+            with np.errstate(over="ignore"):  # such a motion is refused by its accelerations
+                moving = np.array([v, wrench[:, :3] / self.mass[:, None]]) / self.part_size
+                turning = np.array([w, wrench[:, 3:] / of_turning])
+                rates = np.linalg.norm([moving, turning], axis=-1).max(axis=(0, -1), initial=0.0)
             return float(max(rates[0], np.sqrt(rates[1])))
 
         rate = fastest(0.0)

@@ -161,6 +161,7 @@ def test_inputs_are_held_as_in_a_run_step_by_step(tmp_path):
         assert found.tolist() == [here.state["cart.r.x"], here.state["cart.rd.x"], push]
 
 
+@pytest.mark.slow
 def test_outputs_are_those_of_a_result(tmp_path):
     scene = _written(SPRING, tmp_path)
     names = ["track.length", "track.length_rate", "energy.kinetic", "energy.total", "cart.rdd",

@@ -144,7 +144,7 @@ def test_a_scene_has_only_what_it_needs(model, own, others):
         assert "dap3d_core.formulations.standard" not in found
 
 
-@pytest.mark.every(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("with_jumps", [False, True])
 def test_what_a_scene_names_is_there(with_jumps):
     """Each of what the scenes above do without; contacts and other jumps exclude one another."""

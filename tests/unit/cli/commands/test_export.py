@@ -31,7 +31,7 @@ def test_a_model_is_written_as_a_folder_and_not_over_another(tmp_path, capfd, mo
     assert main([*words, "--force"]) == 0
 
 
-@pytest.mark.every(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("fmi", ["3", "2"])
 def test_an_fmu_is_chosen_by_its_suffix(tmp_path, capfd, fmi):
     target = tmp_path / "pen1.fmu"

@@ -1,6 +1,7 @@
 """Groups of bodies that joints and contacts connect: each is solved as if it were alone."""
 
 import numpy as np
+import pytest
 from support.plain import long_in_plain_python
 
 import dap3d_core as dap
@@ -45,6 +46,7 @@ def motion(*lifts):
     return found.reshape(len(result.t), len(lifts), LINKS, -1).swapaxes(0, 1)
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_copies_move_as_one_alone():
     """Bit by bit, through an impact."""

@@ -7,6 +7,7 @@ from support.plain import jit_is_on
 import dap3d_core as dap
 
 
+@pytest.mark.slow
 def test_points_of_a_slider_move_the_spring_that_names_it():
     """x = offset of both points + r of the mass; r in closed form, and its derivatives."""
     mass, k, x_0, r_0, v_0, t = 2.0, 18.0, 0.4, 0.3, 0.5, 0.7
