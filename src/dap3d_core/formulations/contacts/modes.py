@@ -429,6 +429,11 @@ def hold_beside_slip(s: ContactArrays) -> bool:
             put_slip_against(s, c, force, s.begin_way[c])
             found = True
     holds = found and put_matrix(s, True) and hold_inside(s, True)
+    big = NEARLY_ZERO * put_sizes(s, True) if holds else 0.0
+    for k in range(s.closed_count if holds else 0):  # else what slips would not go on by that
+        c, a = s.closed[k], s.rates[3 * k : 3 * k + 3]
+        along = a[0] * s.along[c, 0] + a[1] * s.along[c, 1] + a[2] * s.along[c, 2]
+        holds &= s.begins[c] == 0 or along >= -big
     for k in range(s.group_count):
         s.begins[s.group[k]] = s.along_with[s.group[k]]
     return holds

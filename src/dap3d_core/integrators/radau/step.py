@@ -12,6 +12,7 @@ from typing import Any
 
 from dap3d_core.assembly.arrays import System
 from dap3d_core.assembly.evaluate import copy
+from dap3d_core.formulations.common.constraints import slide_sharing
 from dap3d_core.formulations.stabilized_index2.jacobian import BENT, MAY_BEND, Tangent
 from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
 from dap3d_core.integrators.radau.convergence import is_at_rounding
@@ -93,14 +94,20 @@ def start(work: RadauState, rhs: Function, project: Function, system: System, lo
         return
     change_order(work, FEWEST)
     work.last_stages = FEWEST
-    for k in range(work.last_multipliers.shape[2]):
-        work.last_multipliers[FEWEST - 1, 1, k] = -system.multipliers[k]
+    keep_multipliers(work, system)
     copy(work.state[SLOPE], work.k[0])
     work.first_stage_valid = work.tangent_needed = 1
     work.has_last_step = 0
     work.convergence_factor = 1.0
     if work.fixed_step == 0.0 and work.h == 0.0:
         work.h = step_control.first_step(work, work.k, rhs, system, loops)
+
+
+@compiled
+def keep_multipliers(work: RadauState, system: System) -> None:
+    """Let multipliers of the rates at the state be those that the next step begins with."""
+    for k in range(work.last_multipliers.shape[2]):
+        work.last_multipliers[work.last_stages - 1, 1, k] = -system.multipliers[k]
 
 
 @compiled
@@ -144,6 +151,10 @@ def step(
         elif failure == at.RUNNING:
             work.near_singular_landings = 0
             accept(work, t1, h, error)
+            if slide_sharing(system):  # no iteration corrects the share, and rounding of it grows
+                work.rhs_count += 1
+                rhs(t1, state[at.Y], work.k[0], system, loops)
+                keep_multipliers(work, system)
             event_location.update_switches_after_step(work, h, longest, end)
         else:
             step_control.reject(work, t1, h * step_control.STEP_AFTER_FAILURE, failure)
