@@ -40,7 +40,7 @@ def state_lengths(type_: type) -> dict[str, int]:
 
 
 def state_shape(length: int) -> tuple[int, ...]:
-    """Shape of a state: a number, or a tuple of numbers."""
+    """Shape of so many numbers of a kernel: a number, or a tuple of them."""
     return () if length == 1 else (length,)
 
 
