@@ -29,9 +29,8 @@ def report_error(error: BaseException, *, debug: bool, as_json: bool) -> int:
     try:
         console = stderr()
         if mistakes:
-            number = len(error.mistakes)
-            if number > 1:
-                console.say(f"{number} mistakes:", "bold red")
+            if len(mistakes) > 1:
+                console.say(f"{len(mistakes)} mistakes:", "bold red")
             for line in str(error).split("\n"):
                 indented = line.startswith("    ")
                 console.say(line.strip(), "" if indented else "red", indent=4 if indented else 0)
