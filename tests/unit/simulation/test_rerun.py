@@ -35,7 +35,7 @@ def test_a_run_made_again_is_equal(settings, tmp_path):
 
 
 def test_zeros_are_equal_whatever_their_signs():
-    """Programs of a scene leave out products with zero, which others add; other numbers are told."""
+    """Programs of a scene leave out products with zero, which others add: signs of zeros differ."""
     result = dap.simulate(problems.pendulum(), **SHORT)
     Lam = result.arrays.Lam
     Lam.setflags(write=True)
