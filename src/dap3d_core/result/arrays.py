@@ -293,7 +293,7 @@ def arrays_of(rows: Floats, summary: ModelSummary) -> Arrays:
     """Splits rows of integrator output into arrays.
 
     Args:
-        rows: (nt, row_width): t; the integrated state (angular velocity in body axes; states of
+        rows: (nt, width): t; the integrated state (angular velocity in body axes; states of
             elements; work last); v_dot; lambda; angles; potential energy; largest residuals of the
             three levels; inputs.
         summary: the model of the rows.
