@@ -16,7 +16,7 @@ import numpy as np
 from dap3d_core.assembly.arrays import Floats, System, coordinate_offset, velocity_offset
 from dap3d_core.assembly.metric import in_body_axes
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
-from dap3d_core.kernels.runtime.loop_support import TURN, P, R, V, W
+from dap3d_core.kernels.runtime.loop_support import TURN, P, R, V, W, vector_in
 from dap3d_core.kernels.scalar_math import atan2, where
 from dap3d_core.kernels.vectors import add, cross, dot, scale, sub
 
@@ -47,12 +47,6 @@ Tuple = Any
 
 
 @compiled_into
-def vector_of(x: Floats, k: int) -> Tuple:
-    """The 3-vector at k."""
-    return x[k], x[k + 1], x[k + 2]
-
-
-@compiled_into
 def body_vector(s: Floats, v: Tuple) -> Tuple:
     """A^T v: a global vector along the axes of a body; s: its row of ``System.body``."""
     return in_body_axes(s, v[0], v[1], v[2])
@@ -76,15 +70,15 @@ def rotation_of(system: System, k: int) -> Tuple:
     """Euler parameters, as scalar and vector, by which body i has rotated since T0; T0^-1 T."""
     par, row = system.par, system.turns[k]
     i, j, n = system.body[row[BODY_I]], system.body[row[BODY_J]], row[CONSTANTS]
-    c, v = after(j[P], scale(-1.0, vector_of(j, P + 1)), i[P], vector_of(i, P + 1))
-    return after(par[n + P_0], scale(-1.0, vector_of(par, n + P_0 + 1)), c, v)
+    c, v = after(j[P], scale(-1.0, vector_in(j, P + 1)), i[P], vector_in(i, P + 1))
+    return after(par[n + P_0], scale(-1.0, vector_in(par, n + P_0 + 1)), c, v)
 
 
 @compiled_into
 def spin_of(system: System, k: int) -> Tuple:
     """Angular velocity of body i relative to body j, in axes of body i."""
     i, j = system.body[system.turns[k, BODY_I]], system.body[system.turns[k, BODY_J]]
-    return body_vector(i, sub(vector_of(i, W), vector_of(j, W)))
+    return body_vector(i, sub(vector_in(i, W), vector_in(j, W)))
 
 
 @compiled
@@ -92,11 +86,11 @@ def measure_last(system: System, k: int) -> None:
     """Angle in [-pi, pi] and rate of the only or the second rotation into NEXT, NEXT_RATE."""
     par, row = system.par, system.turns[k]
     state, n = par[row[STATE] :], row[CONSTANTS]
-    axis, w = vector_of(par, n + AXIS_2), spin_of(system, k)
+    axis, w = vector_in(par, n + AXIS_2), spin_of(system, k)
     c, v = rotation_of(system, k)
     rate = dot(axis, w)
     if row[ROTATION] == SECOND:  # the first one has just been measured
-        first, one = par[system.turns[k - 1, STATE] :], vector_of(par, n + AXIS_1)
+        first, one = par[system.turns[k - 1, STATE] :], vector_in(par, n + AXIS_1)
         half = 0.5 * first[NEXT]
         c, v = after(math.cos(half), scale(-math.sin(half), one), c, v)
         rate -= dot(one, axis) * first[NEXT_RATE]
@@ -114,14 +108,14 @@ def measure_first(system: System, k: int) -> None:
     par, row = system.par, system.turns[k]
     i, j = system.body[row[BODY_I]], system.body[row[BODY_J]]
     state, n = par[row[STATE] :], row[CONSTANTS]
-    axis, arm = vector_of(par, n + AXIS_1), vector_of(par, n + ARM)
-    is_point, centre = par[n + IS_POINT], vector_of(par, n + CENTRE)
+    axis, arm = vector_in(par, n + AXIS_1), vector_in(par, n + ARM)
+    is_point, centre = par[n + IS_POINT], vector_in(par, n + CENTRE)
     c, v = rotation_of(system, k)
     moved, w = rotated(c, v, arm), rotated(c, v, spin_of(system, k))
-    way = sub(vector_of(i, R), vector_of(j, R))
-    speed = sub(sub(vector_of(i, V), vector_of(j, V)), cross(vector_of(j, W), way))
-    back, turn = par[n + P_0], scale(-1.0, vector_of(par, n + P_0 + 1))
-    way = rotated(back, turn, sub(body_vector(j, way), vector_of(par, n + R_0)))
+    way = sub(vector_in(i, R), vector_in(j, R))
+    speed = sub(sub(vector_in(i, V), vector_in(j, V)), cross(vector_in(j, W), way))
+    back, turn = par[n + P_0], scale(-1.0, vector_in(par, n + P_0 + 1))
+    way = rotated(back, turn, sub(body_vector(j, way), vector_in(par, n + R_0)))
     speed = rotated(back, turn, body_vector(j, speed))
     start = sub(arm, scale(is_point, centre))
     now = add(moved, scale(is_point, sub(way, centre)))
@@ -137,7 +131,7 @@ def pose_and_spin(y: Floats, n: int, b: int) -> Tuple:
     c, v, w = 1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if b > 0:
         k, f = coordinate_offset(b), velocity_offset(b, n)
-        c, v, w = y[k + 3], vector_of(y, k + 4), vector_of(y, f + 3)
+        c, v, w = y[k + 3], vector_in(y, k + 4), vector_in(y, f + 3)
     return c, v, w
 
 
@@ -146,12 +140,12 @@ def measure_in_state(y: Floats, system: System, k: int) -> None:
     """As ``measure_last``, of the only rotation of a joint, from a state y of bodies."""
     par, row, count = system.par, system.turns[k], system.body.shape[0] - 1
     state, n = par[row[STATE] :], row[CONSTANTS]
-    axis = vector_of(par, n + AXIS_2)
+    axis = vector_in(par, n + AXIS_2)
     c_i, v_i, w_i = pose_and_spin(y, count, row[BODY_I])
     c_j, v_j, w_j = pose_and_spin(y, count, row[BODY_J])
     c, v = after(c_j, scale(-1.0, v_j), c_i, v_i)
     state[NEXT_RATE] = dot(axis, sub(w_i, rotated(c, scale(-1.0, v), w_j)))
-    c, v = after(par[n + P_0], scale(-1.0, vector_of(par, n + P_0 + 1)), c, v)
+    c, v = after(par[n + P_0], scale(-1.0, vector_in(par, n + P_0 + 1)), c, v)
     angle = 2.0 * atan2(dot(axis, v), c)
     state[NEXT] = angle - TURN * np.rint(angle / TURN)
 

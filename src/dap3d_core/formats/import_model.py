@@ -159,11 +159,7 @@ def _checked_scene(
 
 
 def _path(path: Any) -> Path:
-    """The path of a file.
-
-    Raises:
-        SceneError: it is none.
-    """
+    """The path of a file."""
     try:
         return Path(os.fsdecode(path))
     except TypeError:
@@ -195,11 +191,7 @@ def _read_folder(
     importer: FolderImporter, folder: Path, registry: Registry | None, *, strict: bool = False,
     given: bool = False,
 ) -> tuple[Scene, Any]:  # fmt: skip
-    """The scene of a folder, and the report of its importer.
-
-    Raises:
-        SceneError: it cannot be read; or options are given that are for other formats.
-    """
+    """The scene of a folder, and the report of its importer."""
     if given:
         what = f"a {importer.title} model takes no options of packages, links, joints and macros"
         raise _refusal(FormatError(what, remedy="leave them out"), folder)

@@ -110,16 +110,6 @@ STEPPING = next(i for i in INTEGRATORS.values() if i.steps_contacts)
 EXPLICIT, IMPLICIT = INTEGRATORS["dop853"], INTEGRATORS["radau"]
 
 __all__ = [
-    "EXPLICIT",
-    "IMPLICIT",
-    "INTEGRATORS",
-    "TABLEAUS",
-    "explicit",
-    "Integration",
-    "Integrator",
-    "RungeKutta",
-    "STEPPING",
-    "StepCounts",
-    "Status",
-    "Tableau",
-]
+    "EXPLICIT", "IMPLICIT", "INTEGRATORS", "TABLEAUS", "explicit", "Integration", "Integrator",
+    "RungeKutta", "STEPPING", "StepCounts", "Status", "Tableau",
+]  # fmt: skip

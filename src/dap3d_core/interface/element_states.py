@@ -40,7 +40,7 @@ def state_lengths(type_: type) -> dict[str, int]:
 
 
 def state_shape(length: int) -> tuple[int, ...]:
-    """Shape of a state: a number, or a tuple of numbers."""
+    """Shape of so many numbers of a kernel: a number, or a tuple of them."""
     return () if length == 1 else (length,)
 
 
@@ -49,7 +49,9 @@ def add_state_fields(class_: type) -> None:
     if "states" not in vars(class_):
         return
     fields: dict[str, Any] = {}
-    sizes = _sizes(class_)
+    declared = [*vars(class_).values(), *getattr(class_, "__attrs_attrs__", ())]
+    specs = (getattr(field, "metadata", {}).get("dap3d") for field in declared)
+    sizes = {spec.size for spec in specs if spec is not None}
     for name, length in state_lengths(class_).items():
         if isinstance(name, str) and name.isidentifier() and _is_length(length, sizes):
             fields[f"{name}{INITIAL}"] = _initial(name, length)
@@ -66,13 +68,6 @@ def add_fields(class_: type, fields: Mapping[str, Any]) -> None:
             setattr(class_, name, field)
             own[name] = Any
     class_.__annotations__ = own
-
-
-def _sizes(class_: type) -> set[str]:
-    """Names of the sizes of the lists that a class declares, before attrs has made its fields."""
-    declared = [*vars(class_).values(), *getattr(class_, "__attrs_attrs__", ())]
-    specs = (getattr(field, "metadata", {}).get("dap3d") for field in declared)
-    return {spec.size for spec in specs if spec is not None}
 
 
 def _is_length(length: Any, sizes: set[str]) -> bool:

@@ -86,6 +86,8 @@ def atan2(y, x):
 def where(condition, a, b):
     """``a`` where the condition holds, else ``b``: a kernel's branch. Both are evaluated."""
     if hasattr(condition, "tracer"):
+        if isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b):
+            return tuple(where(condition, x, y) for x, y in zip(a, b, strict=True))
         return condition.tracer.where(condition, a, b)
     if _symbolic(condition):
         sympy = _library()

@@ -188,11 +188,7 @@ def _copy(made: Path, target: Path) -> None:
 def _parameters(
     prepared: PreparedRun, names: Sequence[str], options: dict[str, Any], outputs: Outputs
 ) -> list[Variable]:
-    """Parameters as variables.
-
-    Raises:
-        SceneError: no such number, or one that is named twice; one that cannot be set.
-    """
+    """Parameters as variables."""
     try:
         parameters = parameters_named(prepared.compiled.checked, names)
     except SceneError as error:
@@ -204,11 +200,7 @@ def _parameters(
 
 
 def _refuse_shared(variables: Sequence[Variable]) -> None:
-    """Refuse two variables of one name, or that set one number of the memory.
-
-    Raises:
-        SceneError: there are such: their names.
-    """
+    """Refuse two variables of one name, or that set one number of the memory."""
     names = [variable.name for variable in variables]
     if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
         what = f"two variables have the name {twice[0]}"
@@ -225,11 +217,7 @@ def _refuse_shared(variables: Sequence[Variable]) -> None:
 def _parameter(
     prepared: PreparedRun, parameter: SceneParameter, options: dict[str, Any], outputs: Outputs
 ) -> Variable:
-    """A parameter as a variable.
-
-    Raises:
-        SceneError: what depends on it is assembled before the run.
-    """
+    """A parameter as a variable."""
     name = parameter.name
     if parameter.table == "inputs":
         raise refusal(

@@ -11,11 +11,6 @@ from dap3d_core.registry.registry import (
 )
 
 __all__ = [
-    "BLOCK_VARIABLE",
-    "LOAD_LIMIT",
-    "PluginError",
-    "PluginInfo",
-    "Registry",
-    "UnknownTypeError",
+    "BLOCK_VARIABLE", "LOAD_LIMIT", "PluginError", "PluginInfo", "Registry", "UnknownTypeError",
     "load_registry",
-]
+]  # fmt: skip

@@ -8,14 +8,8 @@ from dap3d_core.report.runner import report
 from dap3d_core.report.settings_ladder import Setting
 
 __all__ = [
-    "Failed",
-    "Recommendation",
-    "Reference",
-    "RejectedSetting",
-    "Report",
-    "MeasuredRun",
-    "Setting",
+    "Failed", "Recommendation", "Reference", "RejectedSetting", "Report", "MeasuredRun", "Setting",
     "report",
-]
+]  # fmt: skip
 
 make_callable(__name__, report)

@@ -16,26 +16,8 @@ from dap3d_core.result.quantities.lookup import find, names_of
 from dap3d_core.result.result import Result
 
 __all__ = [
-    "Computed",
-    "Energy",
-    "Entry",
-    "ErrorEstimate",
-    "EventRecord",
-    "Note",
-    "Quantity",
-    "Reaction",
-    "RunMetadata",
-    "Result",
-    "ResultError",
-    "ResultWriter",
-    "RunStatistics",
-    "UnknownNameError",
-    "check_target",
-    "current_versions",
-    "estimated_error",
-    "find",
-    "information",
-    "names_of",
-    "open_result",
-    "warnings_of",
-]
+    "Computed", "Energy", "Entry", "ErrorEstimate", "EventRecord", "Note", "Quantity", "Reaction",
+    "RunMetadata", "Result", "ResultError", "ResultWriter", "RunStatistics", "UnknownNameError",
+    "check_target", "current_versions", "estimated_error", "find", "information", "names_of",
+    "open_result", "warnings_of",
+]  # fmt: skip

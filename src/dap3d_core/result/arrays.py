@@ -273,11 +273,6 @@ def column_sizes(summary: ModelSummary) -> dict[str, int]:
     return {"state": state} | {k: row.length(name) for k, name in sizes.items()} | {"input": inputs}
 
 
-def row_width(summary: ModelSummary) -> int:
-    """Numbers in a row of integrator output."""
-    return _layout(summary).size
-
-
 def _layout(summary: ModelSummary) -> Layout:
     s = summary
     states, inputs = len(s.state_names), len(s.input_names)
@@ -298,7 +293,7 @@ def arrays_of(rows: Floats, summary: ModelSummary) -> Arrays:
     """Splits rows of integrator output into arrays.
 
     Args:
-        rows: (nt, row_width): t; the integrated state (angular velocity in body axes; states of
+        rows: (nt, width): t; the integrated state (angular velocity in body axes; states of
             elements; work last); v_dot; lambda; angles; potential energy; largest residuals of the
             three levels; inputs.
         summary: the model of the rows.
@@ -307,7 +302,7 @@ def arrays_of(rows: Floats, summary: ModelSummary) -> Arrays:
         ValueError: the rows have another width.
     """
     rows = np.asarray(rows, dtype=float)
-    width = row_width(summary)
+    width = _layout(summary).size
     if rows.ndim != 2 or rows.shape[1] != width:
         raise ValueError(f"rows should have the shape (nt, {width}), not {rows.shape}")
     layout = _layout(summary)

@@ -175,7 +175,7 @@ class Result(ResultDisplay, ResultContacts):
 
         Args:
             model: the model that was run.
-            rows: (nt, row_width) integrator output (arrays.py).
+            rows: (nt, width) integrator output (as of ``arrays_of``).
             record: metadata of the run.
             evaluator_of: returns the evaluator of the calling thread, for Jacobian and reactions.
 

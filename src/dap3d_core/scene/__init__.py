@@ -19,25 +19,7 @@ from dap3d_core.scene.validate.validate import check
 from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene
 
 __all__ = [
-    "MISSING",
-    "Animation",
-    "AnimationPoint",
-    "Body",
-    "ValidatedScene",
-    "Element",
-    "Instance",
-    "Mistake",
-    "Point",
-    "Scene",
-    "SceneError",
-    "Simulation",
-    "Vector",
-    "Vector2",
-    "check",
-    "check_simulation",
-    "load",
-    "mistake_at",
-    "parse",
-    "shipped_models",
-    "tables_of",
-]
+    "MISSING", "Animation", "AnimationPoint", "Body", "ValidatedScene", "Element", "Instance",
+    "Mistake", "Point", "Scene", "SceneError", "Simulation", "Vector", "Vector2", "check",
+    "check_simulation", "load", "mistake_at", "parse", "shipped_models", "tables_of",
+]  # fmt: skip

@@ -251,19 +251,16 @@ class Scene(SceneTables, SceneDisplay):
             what = 'the type of an element is the keyword of a type, such as "sph"'
             raise SceneError([Mistake(f"{table}.{name or ''}".rstrip("."), type_, what)])
         if name is None:
-            name = self._free_name(table, elements, type_)
+            count = self._counts.get(f"{table}.{type_}", 0) + 1
+            while f"{type_}{count}" in elements:
+                count += 1
+            self._counts[f"{table}.{type_}"] = count
+            name = f"{type_}{count}"
         name = plain(name)
         self._check_name(table, elements, name)
         fields = {k: plain(v) for k, v in with_identifiers(fields).items() if v is not None}
         elements[name] = Element(name, type_, fields)
         return name
-
-    def _free_name(self, table: str, elements: dict[str, Element], type_: str) -> str:
-        count = self._counts.get(f"{table}.{type_}", 0) + 1
-        while f"{type_}{count}" in elements:
-            count += 1
-        self._counts[f"{table}.{type_}"] = count
-        return f"{type_}{count}"
 
     @staticmethod
     def _check_name(table: str, taken: dict[str, Any], name: Any) -> None:

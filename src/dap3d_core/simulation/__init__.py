@@ -15,17 +15,7 @@ from dap3d_core.simulation.settings import report_times
 from dap3d_core.simulation.simulate import simulate
 
 __all__ = [
-    "AssemblyError",
-    "CheckpointError",
-    "CompiledModel",
-    "Event",
-    "Instant",
-    "RedundantError",
-    "Reproduction",
-    "SimulationError",
-    "RunProgress",
-    "compile_scene",
-    "open_result",
-    "report_times",
-    "simulate",
-]
+    "AssemblyError", "CheckpointError", "CompiledModel", "Event", "Instant", "RedundantError",
+    "Reproduction", "SimulationError", "RunProgress", "compile_scene", "open_result",
+    "report_times", "simulate",
+]  # fmt: skip

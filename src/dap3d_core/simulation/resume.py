@@ -110,7 +110,13 @@ class ResumedRun:
             method=header["method"], allow_code=allow_code, announce=announce,
             joint=header.get("formulation") == "joint",  # which older checkpoints lack
         )  # fmt: skip
-        self._check_types()
+        known, here = self._found.header["types"], digests_of(self.compiled.checked)
+        changed = [name for name in {**known, **here} if known.get(name) != here.get(name)]
+        if changed:
+            raise CheckpointError(
+                f"cannot resume from {self.path}: the formulas of {', '.join(changed)} have "
+                "changed since; run the scene anew, or bring back the files of these types"
+            )
         # its name alone: what a file says does not point out of its folder
         self.output = self.path.with_name(Path(header["output"]).name)
 
@@ -168,15 +174,6 @@ class ResumedRun:
         """True if checkpoints of the resumed run replace this one."""
         other = path_of(target)
         return other.exists() and other.samefile(self.path)
-
-    def _check_types(self) -> None:
-        known, here = self._found.header["types"], digests_of(self.compiled.checked)
-        changed = [name for name in {**known, **here} if known.get(name) != here.get(name)]
-        if changed:
-            raise CheckpointError(
-                f"cannot resume from {self.path}: the formulas of {', '.join(changed)} have "
-                "changed since; run the scene anew, or bring back the files of these types"
-            )
 
     def _rows_so_far(self) -> tuple[Path, Any]:
         """The file that has the rows of the run, and these, block by block."""

@@ -43,11 +43,7 @@ def settings_of(compiled: CompiledModel, **asked: Any) -> Simulation:
 
 
 def _with_contact_engine(compiled: CompiledModel, settings: Simulation) -> Simulation:
-    """The settings with the integrator that steps contacts, where that is chosen.
-
-    Raises:
-        SceneError: events are to follow shapes that collide.
-    """
+    """The settings with the integrator that steps contacts, where that is chosen."""
     model = compiled.model
     if integrator_named(settings.integrator).steps_contacts:
         return settings

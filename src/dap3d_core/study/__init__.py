@@ -12,16 +12,6 @@ from dap3d_core.study.parameters import (
 from dap3d_core.study.study import Batch, PointStatus, Study
 
 __all__ = [
-    "REDUCTIONS",
-    "Batch",
-    "Ensemble",
-    "Output",
-    "PointStatus",
-    "SceneParameter",
-    "Study",
-    "all_parameters",
-    "names_under",
-    "outputs_of",
-    "parameters_named",
-    "with_values",
-]
+    "REDUCTIONS", "Batch", "Ensemble", "Output", "PointStatus", "SceneParameter", "Study",
+    "all_parameters", "names_under", "outputs_of", "parameters_named", "with_values",
+]  # fmt: skip

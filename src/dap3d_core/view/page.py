@@ -65,7 +65,11 @@ class View:
             "data": text.replace("<", "\\u003c"),
             "program": program,
         }
-        return _filled(_text_of("assets/page.html"), parts)
+        pieces: list[str] = []  # each part is put in once, none within inserted text
+        for piece in _text_of("assets/page.html").split("{{"):
+            name, closed, rest = piece.partition("}}")
+            pieces.append(parts[name] + rest if closed else piece)
+        return "".join(pieces)
 
     def save(self, path: str | os.PathLike[str], force: bool = False) -> Path:
         """Write the page to a file, whole or not at all; returns the path.
@@ -140,12 +144,3 @@ def _hash(text: str) -> str:
     """The name of a script or a style in a content security policy: no other one is run."""
     digest = hashlib.sha256(text.encode("utf-8")).digest()
     return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"
-
-
-def _filled(template: str, parts: dict[str, str]) -> str:
-    """A template with its ``{{name}}`` replaced, each once, none within inserted text."""
-    pieces: list[str] = []
-    for piece in template.split("{{"):
-        name, closed, rest = piece.partition("}}")
-        pieces.append(parts[name] + rest if closed else piece)
-    return "".join(pieces)

@@ -10,6 +10,7 @@ from dap3d_core.assembly.collisions.placed_shapes import PlacedShapes
 from dap3d_core.assembly.collisions.supports import radius_of, support
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.vectors import dot
 
 #: Rows of scratch: points of solids i and j, their differences; from j to i; weights, best and
 #: new; a unit vector.
@@ -19,12 +20,6 @@ ROUNDS, NEAR, DISTANCE_ROUNDING = 60, 1e-13, 1e-15
 #: Distances, parts of the sizes, below which solids are taken smaller, and the parts taken.
 CLOSE = 1e-12
 FAR_APART, APART, INSIDE = 0, 1, 2
-
-
-@compiled
-def dot(a: Floats, b: Floats) -> float:
-    """Scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @compiled

@@ -14,13 +14,14 @@ known at once.
 import math
 
 from dap3d_core.assembly.collisions import solids
-from dap3d_core.assembly.collisions.distance import APART, FAR_APART, A, B, V, dot, nearest
+from dap3d_core.assembly.collisions.distance import APART, FAR_APART, A, B, V, nearest
 from dap3d_core.assembly.collisions.manifold import E1, E2, put_points, tangents
 from dap3d_core.assembly.collisions.placed_shapes import PlacedShapes, place_shapes
 from dap3d_core.assembly.collisions.solids import boxes, dot_axis
 from dap3d_core.assembly.collisions.supports import FLAT, curvature, extent_of, radius_of, support
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.vectors import dot
 from dap3d_core.scene.contacts.collision_shapes import (
     BOX,
     CAPSULE,

@@ -2,7 +2,6 @@
 
 import math
 
-from dap3d_core.assembly.collisions.distance import dot
 from dap3d_core.assembly.collisions.placed_shapes import GAP, PlacedShapes, add
 from dap3d_core.assembly.collisions.solids import clip
 from dap3d_core.assembly.collisions.supports import (
@@ -16,6 +15,7 @@ from dap3d_core.assembly.collisions.supports import (
 )
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.vectors import dot
 from dap3d_core.scene.contacts.collision_shapes import CYLINDER, HULL, PLANE
 
 #: Rows of scratch: polygons of i and j, their points while one is clipped; tangents; middle of a

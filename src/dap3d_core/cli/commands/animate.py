@@ -58,7 +58,12 @@ def animate(
     target = output_path(result, output, ".gif" if len(opened.t) > 1 else ".png")
     options = {name: value for name, value in given.items() if value is not None}
     if size is not None:
-        options["size"] = _size(size)
+        match = re.fullmatch(r"(\d{1,6})(?:[x×](\d{1,6}))?", size.strip().lower())
+        if match is None:
+            raise Refused(
+                f"--size is WIDTHxHEIGHT in pixels, such as 640x480, or WIDTH, not {size!r}"
+            )
+        options["size"] = int(match[1]), int(match[2] or 0)
     writable(target, force=force, sources=(Path(result),))
     with counting("frame") as progress, refusing(ValueError, UnknownNameError):
         film = draw(opened, target, progress=progress, fit=fit, force=force, **options)
@@ -70,10 +75,3 @@ def animate(
             "height": height}  # fmt: skip
     show_written(target, contents, data, film.notes)
     return DONE
-
-
-def _size(text: str) -> tuple[int, int]:
-    match = re.fullmatch(r"(\d{1,6})(?:[x×](\d{1,6}))?", text.strip().lower())
-    if match is None:
-        raise Refused(f"--size is WIDTHxHEIGHT in pixels, such as 640x480, or WIDTH, not {text!r}")
-    return int(match[1]), int(match[2] or 0)

@@ -100,11 +100,7 @@ def equilibrium(
 def _target(
     output: str | None, over: str | None, sources: tuple[Any, ...], *, force: bool
 ) -> Path | None:
-    """The file to write: a scene, or with --over a picture.
-
-    Raises:
-        Refused: it cannot be written, or is no picture, or one without a path.
-    """
+    """The file to write: a scene, or with --over a picture."""
     from dap3d_core.cli.framework.paths import SCENES, writable
 
     if output is None:

@@ -117,7 +117,10 @@ def _over(
         found = dap.modes_over(scene, name, values, t=time or 0.0, modes=number or LISTED,
                                allow_code=allow_code)  # fmt: skip
     _draw(found, ["eigenvalues" if locus else "frequencies"], plot, force=force)
-    data = _data_over(scene.name, found)
+    names = ("parameter", "unit", "values", "frequencies", "damping", "grows", "stable", "steady",
+             "notes")  # fmt: skip
+    parts = {"real": found.eigenvalues.real, "imag": found.eigenvalues.imag}
+    data = {"scene": scene.name} | {n: getattr(found, n) for n in names} | parts
     show_data(data, lambda console: _show_over(console, scene.name, found), plot)
     return DONE
 
@@ -225,14 +228,6 @@ def _complex(real: float, imaginary: float) -> str:
         return f"{shown:.4g}"
     lead = f"{shown:.3g} " if shown else ""
     return f"{lead}± {imaginary:.4g}i"
-
-
-def _data_over(name: str, found: "ModesOver") -> dict[str, Any]:
-    """The modes as data; null where there is no such mode."""
-    names = ("parameter", "unit", "values", "frequencies", "damping", "grows", "stable", "steady",
-             "notes")  # fmt: skip
-    parts = {"real": found.eigenvalues.real, "imag": found.eigenvalues.imag}
-    return {"scene": name} | {n: getattr(found, n) for n in names} | parts
 
 
 def _show_over(console: "Terminal", name: str, found: "ModesOver") -> None:

@@ -115,11 +115,7 @@ def _open(
     at: Sequence[str],
     types: Mapping[str, Any],
 ) -> tuple[Any, tuple[str, ...], dict[str, float]]:
-    """The results or the sweep, the names to draw, and the cuts through a sweep.
-
-    Raises:
-        Refused: a file cannot be read; a sweep together with other files; an invalid cut.
-    """
+    """The results or the sweep, the names to draw, and the cuts through a sweep."""
     from dap3d_core.cli.framework.paths import open_result, open_sweep
     from dap3d_core.study.sweep.dataset import is_sweep
 
@@ -157,11 +153,7 @@ def _cuts(at: Sequence[str]) -> dict[str, float]:
 
 
 def _labels(files: Sequence[str]) -> list[str]:
-    """Names of runs for the legend: as many parts of their paths as distinguish them.
-
-    Raises:
-        Refused: a file is named twice.
-    """
+    """Names of runs for the legend: as many parts of their paths as distinguish them."""
     paths = [Path(f).absolute() for f in files]
     if len(set(paths)) < len(files):
         raise Refused("a result is named twice; each run is drawn once")

@@ -94,11 +94,7 @@ def response(
 def _frequencies(
     lin: "Linearization", first: float | None, last: float | None, number: int
 ) -> "Floats":
-    """Frequencies in Hz; those that are not given are around the modes.
-
-    Raises:
-        Refused: the last one is not above the first.
-    """
+    """Frequencies in Hz; those that are not given are around the modes."""
     from dap3d_core.simulation.linearization.state_matrices import samples, usual_range
 
     low, high = usual_range(lin.frequencies)

@@ -58,7 +58,12 @@ def show_report(console: Terminal, report: "Report", command: str, *, with_targe
     for method, integrator in dict.fromkeys((r.method, r.integrator) for r in report.runs):
         console.title(f"{method}, {integrator}")
         runs = [r for r in report.runs if (r.method, r.integrator) == (method, integrator)]
-        _show_runs(console, runs)
+        wide = console.width >= WIDE
+        columns = ["", "setting", "time", "error", "energy"]
+        columns += ["|C|", "steps", "rhs"] if wide else ["rhs"]
+        rows = [_row(run, wide=wide) for run in runs]
+        every = range(len(columns))
+        console.table(columns, rows, right=tuple(every)[2:], fixed=tuple(every))
     if report.runs:
         legend = "* no faster run has a smaller error"
         if any(run.below_uncertainty for run in report.runs):
@@ -103,15 +108,6 @@ def _expected(report: "Report") -> str:
         f"{values} of expected.toml, largest deviation {expected.deviation:.1e}, {verdict} the "
         "tolerances there"
     )
-
-
-def _show_runs(console: Terminal, runs: "list[MeasuredRun]") -> None:
-    wide = console.width >= WIDE
-    columns = ["", "setting", "time", "error", "energy"]
-    columns += ["|C|", "steps", "rhs"] if wide else ["rhs"]
-    rows = [_row(run, wide=wide) for run in runs]
-    every = range(len(columns))
-    console.table(columns, rows, right=tuple(every)[2:], fixed=tuple(every))
 
 
 def _row(run: "MeasuredRun", *, wide: bool) -> list[str | Text]:

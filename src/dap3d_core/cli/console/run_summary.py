@@ -185,7 +185,15 @@ def report_run(outcome: RunOutcome, model: str, target: Path, *, strict: bool) -
     if is_quiet() and not prints_json():
         stderr().items(violations, "red")
     if outcome.reason:
-        _show_early_end(outcome, target)
+        console = stderr()
+        console.say(outcome.reason, "bold red")
+        symbol, unit = _abscissa(outcome.result.settings)
+        last = f"{symbol} = {outcome.result.t[-1]:.6g} {unit}"
+        console.say(f"what was computed until then, up to {last}, is in {target}")
+        if outcome.checkpoint is not None:
+            console.say("to continue from there:")
+            command = f"dap3d resume {shell_word(outcome.checkpoint)}"
+            console.say(command, "green", indent=2, whole=True)
     if code != outcome.code:
         stderr().say("--strict: there are warnings, or the ledger does not close; exit code 1")
     return code
@@ -212,18 +220,6 @@ def _show_run(
     commands = (f"plot {file} {words}", f"view {file} --open", f"animate {file}", f"info {file}")
     for command in commands:
         console.say(f"dap3d {command}", "green", indent=2, whole=True)
-
-
-def _show_early_end(outcome: RunOutcome, target: Path) -> None:
-    console = stderr()
-    console.say(outcome.reason, "bold red")
-    symbol, unit = _abscissa(outcome.result.settings)
-    last = f"{symbol} = {outcome.result.t[-1]:.6g} {unit}"
-    console.say(f"what was computed until then, up to {last}, is in {target}")
-    if outcome.checkpoint is not None:
-        console.say("to continue from there:")
-        command = f"dap3d resume {shell_word(outcome.checkpoint)}"
-        console.say(command, "green", indent=2, whole=True)
 
 
 # ---------------------------------------------------------------------------- text

@@ -6,7 +6,7 @@ import sys
 import traceback
 from typing import Any
 
-from dap3d_core.cli.console.console import Terminal, json_value, print_json, stderr
+from dap3d_core.cli.console.console import json_value, print_json, stderr
 from dap3d_core.cli.process import exit_codes
 from dap3d_core.cli.process.memory import address_space, is_used_up
 from dap3d_core.cli.process.streams import leave_stderr
@@ -29,7 +29,11 @@ def report_error(error: BaseException, *, debug: bool, as_json: bool) -> int:
     try:
         console = stderr()
         if mistakes:
-            _show_mistakes(console, error)
+            if len(mistakes) > 1:
+                console.say(f"{len(mistakes)} mistakes:", "bold red")
+            for line in str(error).split("\n"):
+                indented = line.startswith("    ")
+                console.say(line.strip(), "" if indented else "red", indent=4 if indented else 0)
         else:
             console.say(text, "bold red")
         if code == exit_codes.FAILED and not debug and _is_unexpected(error):
@@ -51,15 +55,6 @@ def mistakes_of(error: BaseException) -> list[dict[str, Any]]:
         | {"value": None if m.value is MISSING else json_value(m.value)}
         for m in error.mistakes
     ]
-
-
-def _show_mistakes(console: Terminal, error: Any) -> None:
-    number = len(error.mistakes)
-    if number > 1:
-        console.say(f"{number} mistakes:", "bold red")
-    for line in str(error).split("\n"):
-        indented = line.startswith("    ")
-        console.say(line.strip(), "" if indented else "red", indent=4 if indented else 0)
 
 
 def _judge(error: BaseException) -> tuple[int, str]:

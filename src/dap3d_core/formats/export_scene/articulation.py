@@ -383,7 +383,10 @@ def _add_rotors(builder: ModelBuilder) -> None:
     for name, rotor in builder.elements.rotors.items():
         pairs: list[tuple[str, float, tuple[float, ...]]] = []
         for follower, fields in rotor.followers:
-            joint = _followed(builder, fields)
+            bodies = {str(fields["body_i"]), builder.elements.vector(fields["a_j"])[0]}
+            kind = "prismatic" if fields.get("along") else "revolute"
+            along = _joints_along(builder, kind, bodies, fields["a_j"])
+            joint = next((joint for joint, sense in along if sense > 0.0), None)
             if joint is None:
                 text = f"{follower} of type follow: it follows no joint"
                 builder.remarks.leave_out(NOWHERE, text, motion=True)
@@ -402,11 +405,3 @@ def _add_rotors(builder: ModelBuilder) -> None:
         builder.model.couplings += [
             Coupling("", one, leader, ratio, curve=curve) for one, ratio, curve in pairs
         ]
-
-
-def _followed(builder: ModelBuilder, fields: dict[str, Any]) -> SceneJoint | None:
-    """The joint whose coordinate a follower couples."""
-    bodies = {str(fields["body_i"]), builder.elements.vector(fields["a_j"])[0]}
-    kind = "prismatic" if fields.get("along") else "revolute"
-    along = _joints_along(builder, kind, bodies, fields["a_j"])
-    return next((joint for joint, sense in along if sense > 0.0), None)

@@ -1,7 +1,7 @@
 """Actuators of a model as inputs, with the forces that they set; tendons, and those that hold."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import inf, isfinite
 from typing import Any
 
@@ -14,7 +14,6 @@ from dap3d_core.formats.import_scene.start import AGREE, coordinate
 from dap3d_core.interface.formats.articulation import Actuator, Articulation, Joint, Limits, Tendon
 from dap3d_core.interface.formats.frames import Frame, quaternion
 from dap3d_core.interface.formats.tendon_length import length_of_line, rate_of_line
-from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.tables import GROUND
 
 #: Time constant of soft stops of tendons, s.
@@ -146,7 +145,10 @@ def add_tendons(builder: SceneBuilder, model: Articulation) -> None:
         spring: dict[str, Any] = {"k": tendon.stiffness or None, "c": tendon.damping or None}
         if keyword == "ptp" and not tendon.play:
             ends = dict(zip(("P_i", "P_j"), fields["points"], strict=True))
-            _add_limits(builder, tendon, ends)
+            for side, bound in (("min", tendon.limits.lower), ("max", tendon.limits.upper)):
+                if _limits(builder, tendon) and isfinite(bound) and bound > 0.0:
+                    name = f"{tendon.name}_{side}_stop"
+                    builder.add_force("ptp_stop", name, **ends, side=side, l_stop=bound)
             if tendon.armature:
                 _add_slider(builder, model, attrs.evolve(tendon, limits=Limits()), fields)
             fields, spring["l0"] = ends, tendon.rest or None
@@ -269,14 +271,6 @@ def _add_stops(
             )  # fmt: skip
 
 
-def _add_limits(builder: SceneBuilder, tendon: Tendon, ends: dict[str, str]) -> None:
-    """Add rigid stops at the limits of a tendon between two points."""
-    for side, bound in (("min", tendon.limits.lower), ("max", tendon.limits.upper)):
-        if _limits(builder, tendon) and isfinite(bound) and bound > 0.0:
-            name = f"{tendon.name}_{side}_stop"
-            builder.add_force("ptp_stop", name, **ends, side=side, l_stop=bound)
-
-
 def _limits(builder: SceneBuilder, tendon: Tendon) -> bool:
     """True for a tendon with rigid limits; those that cannot be are left out, remarked."""
     if not tendon.limits.finite:
@@ -307,7 +301,10 @@ def _add_slider(
         text = "a tendon starts beyond its limits: they hold it where it starts"
         builder.remarks.translate(tendon.place, text, motion=True)
     mass = tendon.armature or LIGHT * min(mass for mass in masses if mass)
-    level = _level(model.gravity)  # a rail along which it weighs nothing
+    # a rail along which it weighs nothing
+    across = np.cross(np.eye(3)[np.argmin(np.abs(model.gravity))], model.gravity)
+    size = np.linalg.norm(across)
+    level = across / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
     rate = rate_of_line(tendon, builder.pose_of, builder.motion_of)
     scene.add_body(slider, mass=mass, Jp=(mass,) * 3, r=float_tuple(start * level),
                    r_dot=float_tuple(rate * level) if rate else None)  # fmt: skip
@@ -321,13 +318,6 @@ def _add_slider(
             "divisors": (*(tendon.divisors or (1.0,) * len(links))[: len(tendon.points) - 1],
                          0.0, -1.0, 1.0)}  # fmt: skip
     builder.add_joint("tendon", f"{tendon.name}_length", **{**fields, **more})
-
-
-def _level(gravity: Sequence[float]) -> Floats:
-    """A unit vector across gravity."""
-    across = np.cross(np.eye(3)[np.argmin(np.abs(gravity))], gravity)
-    size = np.linalg.norm(across)
-    return across / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
 
 
 def add_held(builder: SceneBuilder, model: Articulation) -> None:

@@ -9,12 +9,11 @@ from typing import Any
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.evaluate import place_states
 from dap3d_core.assembly.metric import orient_by_state, put_rotation, square_of
-from dap3d_core.assembly.turns import vector_of
 from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.formulations.joint.half_angles import half_angles
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
-from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A, P, R, V, W
+from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A, P, R, V, W, vector_in
 from dap3d_core.kernels.vectors import add, cross, dot, scale
 
 Vector = Any
@@ -29,7 +28,7 @@ def put(x: Floats, k: int, a: Vector) -> None:
 @compiled_into
 def times(x: Floats, k: int, a: Vector) -> Vector:
     """The 3x3 matrix at k, by rows, times a 3-vector."""
-    return dot(vector_of(x, k), a), dot(vector_of(x, k + 3), a), dot(vector_of(x, k + 6), a)
+    return dot(vector_in(x, k), a), dot(vector_in(x, k + 3), a), dot(vector_in(x, k + 6), a)
 
 
 @compiled
@@ -61,17 +60,17 @@ def place_nodes(y: Floats, system: System) -> None:
             link(b, up, K, k, m, C, c)
         elif motion == node.SPHERICAL:
             orient_by_state(b, o, (y[i], y[i + 1], y[i + 2], y[i + 3]))
-            w, alpha = turn_freely(vector_of(y, j), b, o, K, k), (0.0, 0.0, 0.0)
+            w, alpha = turn_freely(vector_in(y, j), b, o, K, k), (0.0, 0.0, 0.0)
             link(b, up, K, k, m, C, c)
         elif motion == node.FREE:
             orient_by_state(b, o, (y[i + 3], y[i + 4], y[i + 5], y[i + 6]))
-            w, alpha = turn_freely(vector_of(y, j + 3), b, o, K, k), (0.0, 0.0, 0.0)
-            put(K, k + node.POINT, vector_of(y, i))
-            put(K, k + node.VELOCITY, vector_of(y, j))
+            w, alpha = turn_freely(vector_in(y, j + 3), b, o, K, k), (0.0, 0.0, 0.0)
+            put(K, k + node.POINT, vector_in(y, i))
+            put(K, k + node.VELOCITY, vector_in(y, j))
             put(K, k + node.ACCELERATION, alpha)
         else:
             orient(b, o, relative(b, up, (C[c], C[c + 1], C[c + 2], C[c + 3])))
-            w, alpha = vector_of(b, up + W), vector_of(K, m + node.ALPHA)
+            w, alpha = vector_in(b, up + W), vector_in(K, m + node.ALPHA)
             link(b, up, K, k, m, C, c)
             if motion == node.PRISMATIC:
                 slide(y[i], y[j], b, up, K, k, m, C, c)
@@ -79,10 +78,10 @@ def place_nodes(y: Floats, system: System) -> None:
         spin(K, k + node.SPIN, w, alpha)
         put(b, o + W, w)
         if tree[t + node.FLAGS] & node.HAS_MASS != 0:
-            s = times(b, o + A, vector_of(C, c + node.CENTRE))
+            s = times(b, o + A, vector_in(C, c + node.CENTRE))
             put(K, k + node.CENTRE_NOW, s)
-            put(b, o + R, add(vector_of(K, k + node.POINT), s))
-            put(b, o + V, add(vector_of(K, k + node.VELOCITY), cross(w, s)))
+            put(b, o + R, add(vector_in(K, k + node.POINT), s))
+            put(b, o + V, add(vector_in(K, k + node.VELOCITY), cross(w, s)))
 
 
 @compiled_into
@@ -121,10 +120,10 @@ def orient(b: Floats, o: int, e: Any) -> None:
 @compiled_into
 def revolve(rate: float, b: Floats, up: int, K: Floats, k: int, m: int, C: Floats, c: int) -> Any:
     """Angular velocity and, without q_ddot, acceleration of a revolute node; sets its axis."""
-    axis = times(b, up + A, vector_of(C, c + node.AXIS))
+    axis = times(b, up + A, vector_in(C, c + node.AXIS))
     put(K, k + node.AXIS_NOW, axis)
-    w, relative_w = vector_of(b, up + W), scale(rate, axis)
-    return add(w, relative_w), add(vector_of(K, m + node.ALPHA), cross(w, relative_w))
+    w, relative_w = vector_in(b, up + W), scale(rate, axis)
+    return add(w, relative_w), add(vector_in(K, m + node.ALPHA), cross(w, relative_w))
 
 
 @compiled_into
@@ -137,12 +136,12 @@ def turn_freely(own: Vector, b: Floats, o: int, K: Floats, k: int) -> Vector:
 @compiled_into
 def link(b: Floats, up: int, K: Floats, k: int, m: int, C: Floats, c: int) -> None:
     """P of a node, its velocity and acceleration as a point of the parent."""
-    arm = times(b, up + A, vector_of(C, c + node.LINK))
+    arm = times(b, up + A, vector_in(C, c + node.LINK))
     put(K, k + node.LINK_NOW, arm)
-    put(K, k + node.POINT, add(vector_of(K, m + node.POINT), arm))
-    carried, bent = cross(vector_of(b, up + W), arm), times(K, m + node.SPIN, arm)
-    put(K, k + node.VELOCITY, add(vector_of(K, m + node.VELOCITY), carried))
-    put(K, k + node.ACCELERATION, add(vector_of(K, m + node.ACCELERATION), bent))
+    put(K, k + node.POINT, add(vector_in(K, m + node.POINT), arm))
+    carried, bent = cross(vector_in(b, up + W), arm), times(K, m + node.SPIN, arm)
+    put(K, k + node.VELOCITY, add(vector_in(K, m + node.VELOCITY), carried))
+    put(K, k + node.ACCELERATION, add(vector_in(K, m + node.ACCELERATION), bent))
 
 
 @compiled_into
@@ -150,15 +149,15 @@ def slide(
     q: float, rate: float, b: Floats, up: int, K: Floats, k: int, m: int, C: Floats, c: int
 ) -> None:
     """Move P of a prismatic node along the parent's axis."""
-    axis, w = times(b, up + A, vector_of(C, c + node.AXIS)), vector_of(b, up + W)
+    axis, w = times(b, up + A, vector_in(C, c + node.AXIS)), vector_in(b, up + W)
     way, turned = scale(q, axis), cross(w, axis)
     put(K, k + node.AXIS_NOW, axis)
-    put(K, k + node.LINK_NOW, add(vector_of(K, k + node.LINK_NOW), way))
-    put(K, k + node.POINT, add(vector_of(K, k + node.POINT), way))
+    put(K, k + node.LINK_NOW, add(vector_in(K, k + node.LINK_NOW), way))
+    put(K, k + node.POINT, add(vector_in(K, k + node.POINT), way))
     change = add(scale(q, turned), scale(rate, axis))
-    put(K, k + node.VELOCITY, add(vector_of(K, k + node.VELOCITY), change))
+    put(K, k + node.VELOCITY, add(vector_in(K, k + node.VELOCITY), change))
     change = add(times(K, m + node.SPIN, way), scale(2.0 * rate, turned))
-    put(K, k + node.ACCELERATION, add(vector_of(K, k + node.ACCELERATION), change))
+    put(K, k + node.ACCELERATION, add(vector_in(K, k + node.ACCELERATION), change))
 
 
 @compiled_into

@@ -12,12 +12,11 @@ from typing import Any
 
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.metric import gyroscopic_moment
-from dap3d_core.assembly.turns import vector_of
 from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.formulations.joint.place import put, times
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
-from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A, V, W
+from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A, V, W, vector_in
 from dap3d_core.kernels.vectors import add, cross, dot, scale, sub
 
 Vector = Any
@@ -48,24 +47,24 @@ def reduce_nodes(system: System, forces: Floats, keeps: bool) -> float:
         motion, flags, row = tree[t + node.MOTION], tree[t + node.FLAGS], tree[t + node.ROW]
         M, H, J, moment, force = NO_INERTIA, NO_MATRIX, NO_INERTIA, NOTHING, NOTHING
         if flags & node.HAS_MASS != 0:
-            o, f, couple = BODY_WIDTH * row, vector_of(F, 6 * row), vector_of(F, 6 * row + 3)
+            o, f, couple = BODY_WIDTH * row, vector_in(F, 6 * row), vector_in(F, 6 * row + 3)
             if flags & node.IS_ALONE != 0:
                 power += accelerate_alone(motion, b, o, C, c, K, k, f, couple)
                 continue
-            w = vector_of(b, o + W)
-            power += dot(f, vector_of(b, o + V)) + dot(couple, w)
+            w = vector_in(b, o + W)
+            power += dot(f, vector_in(b, o + V)) + dot(couple, w)
             J = own_inertia(b, o, C, c)
-            M, H = own_mass(C[c + node.MASS], vector_of(K, k + node.CENTRE_NOW))
+            M, H = own_mass(C[c + node.MASS], vector_in(K, k + node.CENTRE_NOW))
             moment, force = missing(J, C[c + node.MASS], w, K, k, f, couple)
             if motion < node.SPHERICAL:
-                moment = sub(moment, symmetric_times(J, vector_of(K, k + node.ALPHA)))
+                moment = sub(moment, symmetric_times(J, vector_in(K, k + node.ALPHA)))
         if flags & node.HAS_CHILDREN != 0:
             M, H = add_own_mass(M, H, six_of(K, k + node.MATRIX_M), nine_of(K, k + node.MATRIX_H))
             J = sum6(J, six_of(K, k + node.MATRIX_J))
-            moment = add(moment, vector_of(K, k + node.MOMENT))
-            force = add(force, vector_of(K, k + node.FORCE))
+            moment = add(moment, vector_in(K, k + node.MOMENT))
+            force = add(force, vector_in(K, k + node.FORCE))
         m, is_first = node.WORK_WIDTH * tree[t + node.PARENT], flags & node.IS_FIRST != 0
-        arm = vector_of(K, k + node.LINK_NOW)
+        arm = vector_in(K, k + node.LINK_NOW)
         if motion == node.REVOLUTE:
             M, H, J, moment, force = release_turn(K, k, M, H, J, moment, force, keeps)
             if m != 0:
@@ -97,7 +96,7 @@ def reduce_nodes(system: System, forces: Floats, keeps: bool) -> float:
 def own_inertia(b: Floats, o: int, C: Floats, c: int) -> Symmetric:
     """Inertia of a body about P, global axes: A J' A^T."""
     J = six_of(C, c + node.INERTIA)
-    one, two, three = vector_of(b, o + A), vector_of(b, o + A + 3), vector_of(b, o + A + 6)
+    one, two, three = vector_in(b, o + A), vector_in(b, o + A + 3), vector_in(b, o + A + 6)
     x, y, z = symmetric_times(J, one), symmetric_times(J, two), symmetric_times(J, three)
     return dot(x, one), dot(x, two), dot(x, three), dot(y, two), dot(y, three), dot(z, three)
 
@@ -125,7 +124,7 @@ def missing(J: Symmetric, mass: float, w: Vector, K: Floats, k: int, f: Vector, 
 
     The moment is without J alpha, which is zero where the state has angular velocities as such.
     """
-    s, a = vector_of(K, k + node.CENTRE_NOW), vector_of(K, k + node.ACCELERATION)
+    s, a = vector_in(K, k + node.CENTRE_NOW), vector_in(K, k + node.ACCELERATION)
     centre = add(a, times(K, k + node.SPIN, s))
     moment = add(n, cross(s, sub(f, scale(mass, a))))
     return sub(moment, cross(w, symmetric_times(J, w))), sub(f, scale(mass, centre))
@@ -142,21 +141,21 @@ def accelerate_alone(
     """
     J, turn = six_of(C, c + node.INERTIA), nine_of(b, o + A)
     if motion >= node.SPHERICAL:
-        w = vector_of(K, k + node.OWN_W)
-        moment = cross(vector_of(C, c + node.CENTRE), transposed_times(turn, f))
+        w = vector_in(K, k + node.OWN_W)
+        moment = cross(vector_in(C, c + node.CENTRE), transposed_times(turn, f))
         moment = add(transposed_times(turn, n), moment)
         lacking = sub(moment, gyroscopic_moment(J, w))
         put(K, k + node.MOMENT, solve_factored(factors_of(J), lacking))
         put(K, k + node.FORCE, scale(1.0 / C[c + node.MASS], f))
-        return dot(moment, w) + dot(f, vector_of(K, k + node.VELOCITY))
+        return dot(moment, w) + dot(f, vector_in(K, k + node.VELOCITY))
     if motion == node.REVOLUTE:
-        axis = vector_of(K, k + node.AXIS_NOW)
+        axis = vector_in(K, k + node.AXIS_NOW)
         own = transposed_times(turn, axis)
-        lack = dot(axis, add(n, cross(vector_of(K, k + node.CENTRE_NOW), f)))
+        lack = dot(axis, add(n, cross(vector_in(K, k + node.CENTRE_NOW), f)))
         K[k + node.FREE_RATE] = lack * (1.0 / dot(own, symmetric_times(J, own)))
     elif motion == node.PRISMATIC:
-        K[k + node.FREE_RATE] = dot(vector_of(K, k + node.AXIS_NOW), f) * (1.0 / C[c + node.MASS])
-    return dot(f, vector_of(b, o + V)) + dot(n, vector_of(b, o + W))
+        K[k + node.FREE_RATE] = dot(vector_in(K, k + node.AXIS_NOW), f) * (1.0 / C[c + node.MASS])
+    return dot(f, vector_in(b, o + V)) + dot(n, vector_in(b, o + W))
 
 
 @compiled_into
@@ -165,7 +164,7 @@ def release_turn(
     keeps: bool,
 ) -> Any:  # fmt: skip
     """Eliminate a rotation about an axis through P."""
-    axis = vector_of(K, k + node.AXIS_NOW)
+    axis = vector_in(K, k + node.AXIS_NOW)
     u, v = symmetric_times(J, axis), transposed_times(H, axis)
     d, lack = dot(axis, u), dot(axis, moment)
     return release(K, k, u, v, d, lack, M, H, J, moment, force, keeps)
@@ -177,7 +176,7 @@ def release_slide(
     keeps: bool,
 ) -> Any:  # fmt: skip
     """Eliminate a translation along an axis."""
-    axis = vector_of(K, k + node.AXIS_NOW)
+    axis = vector_in(K, k + node.AXIS_NOW)
     u, v = matrix_times(H, axis), symmetric_times(M, axis)
     d, lack = dot(axis, v), dot(axis, force)
     return release(K, k, u, v, d, lack, M, H, J, moment, force, keeps)
@@ -307,7 +306,7 @@ def add_to_parent(
         M = sum6(M, six_of(K, m + node.MATRIX_M))
         H = sum9(H, nine_of(K, m + node.MATRIX_H))
         J = sum6(J, six_of(K, m + node.MATRIX_J))
-        n, f = add(n, vector_of(K, m + node.MOMENT)), add(f, vector_of(K, m + node.FORCE))
+        n, f = add(n, vector_in(K, m + node.MOMENT)), add(f, vector_in(K, m + node.FORCE))
     put_six(K, m + node.MATRIX_M, M)
     put(K, m + node.MATRIX_H, (H[0], H[1], H[2]))
     put(K, m + node.MATRIX_H + 3, (H[3], H[4], H[5]))

@@ -4,7 +4,6 @@ Featherstone, Rigid Body Dynamics Algorithms (2008), 7.3.
 """
 
 from dap3d_core.assembly.arrays import Floats, System
-from dap3d_core.assembly.turns import vector_of
 from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.formulations.joint.place import Vector, put, times
 from dap3d_core.formulations.joint.reduce import (
@@ -16,7 +15,7 @@ from dap3d_core.formulations.joint.reduce import (
 )
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
-from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A
+from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A, vector_in
 from dap3d_core.kernels.vectors import add, cross, dot, scale, sub
 
 
@@ -28,30 +27,30 @@ def spread_tree(y: Floats, out: Floats, system: System) -> None:
         t, k = node.TREE_WIDTH * n, node.WORK_WIDTH * n
         m, o = node.WORK_WIDTH * tree[t + node.PARENT], BODY_WIDTH * tree[t + node.ROW]
         i, j, motion = tree[t + node.COORDINATE], tree[t + node.RATE], tree[t + node.MOTION]
-        alpha = vector_of(K, m + node.ALPHA_Q)
-        carried = cross(alpha, vector_of(K, k + node.LINK_NOW))
-        a = add(vector_of(K, m + node.ACCELERATION_Q), carried)
+        alpha = vector_in(K, m + node.ALPHA_Q)
+        carried = cross(alpha, vector_in(K, k + node.LINK_NOW))
+        a = add(vector_in(K, m + node.ACCELERATION_Q), carried)
         is_alone = tree[t + node.FLAGS] & node.IS_ALONE != 0
         if motion == node.FREE:
-            a = vector_of(K, k + node.FORCE)
+            a = vector_in(K, k + node.FORCE)
             if not is_alone:
                 a = solve_factored(factors_of(six_of(K, k + node.MATRIX_M)), a)
-            put(out, i, vector_of(y, j))
+            put(out, i, vector_in(y, j))
             put(out, j, a)
             i, j = i + 3, j + 3
         if motion >= node.SPHERICAL:
             if is_alone:
-                own = vector_of(K, k + node.MOMENT)
+                own = vector_in(K, k + node.MOMENT)
                 alpha = times(b, o + A, own)
             else:
-                alpha = sub(vector_of(K, k + node.MOMENT), times(K, k + node.MATRIX_H, a))
+                alpha = sub(vector_in(K, k + node.MOMENT), times(K, k + node.MATRIX_H, a))
                 own = transposed_times(nine_of(b, o + A), alpha)
-            turn_parameters(y, i, vector_of(y, j), out)
+            turn_parameters(y, i, vector_in(y, j), out)
             put(out, j, own)
         elif motion != node.FIXED:
-            rate = K[k + node.FREE_RATE] - dot(vector_of(K, k + node.GAIN), alpha)
-            rate -= dot(vector_of(K, k + node.GAIN + 3), a)
-            change = scale(rate, vector_of(K, k + node.AXIS_NOW))
+            rate = K[k + node.FREE_RATE] - dot(vector_in(K, k + node.GAIN), alpha)
+            rate -= dot(vector_in(K, k + node.GAIN + 3), a)
+            change = scale(rate, vector_in(K, k + node.AXIS_NOW))
             if motion == node.REVOLUTE:
                 alpha = add(alpha, change)
             else:
@@ -79,8 +78,8 @@ def body_accelerations(system: System, out: Floats) -> None:
     for n in range(1, system.tree.nodes.shape[0]):
         t, k = node.TREE_WIDTH * n, node.WORK_WIDTH * n
         if tree[t + node.FLAGS] & node.HAS_MASS != 0:
-            o, s = 6 * (tree[t + node.ROW] - 1), vector_of(K, k + node.CENTRE_NOW)
-            alpha, a = vector_of(K, k + node.ALPHA_Q), vector_of(K, k + node.ACCELERATION_Q)
-            own = add(vector_of(K, k + node.ACCELERATION), times(K, k + node.SPIN, s))
+            o, s = 6 * (tree[t + node.ROW] - 1), vector_in(K, k + node.CENTRE_NOW)
+            alpha, a = vector_in(K, k + node.ALPHA_Q), vector_in(K, k + node.ACCELERATION_Q)
+            own = add(vector_in(K, k + node.ACCELERATION), times(K, k + node.SPIN, s))
             put(out, o, add(own, add(a, cross(alpha, s))))
-            put(out, o + 3, add(vector_of(K, k + node.ALPHA), alpha))
+            put(out, o + 3, add(vector_in(K, k + node.ALPHA), alpha))

@@ -9,7 +9,6 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import LENGTH, Floats, System
 from dap3d_core.assembly.evaluate import largest_weighted
-from dap3d_core.assembly.turns import vector_of
 from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.formulations.joint.equations import normalise_rotations
 from dap3d_core.formulations.joint.equations import place as place  # read by projection.py
@@ -18,7 +17,7 @@ from dap3d_core.formulations.joint.reduce import reduce_nodes
 from dap3d_core.formulations.joint.spread import spread_tree
 from dap3d_core.formulations.joint_loops import layout, loads, profile
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
-from dap3d_core.kernels.runtime.loop_support import R, V, W
+from dap3d_core.kernels.runtime.loop_support import R, V, W, vector_in
 from dap3d_core.kernels.scalar_math import where
 
 #: Pivots of dependent rows fall by LESS where compliances do; where they fall by less than HELD,
@@ -167,7 +166,7 @@ def add_displacement(y: Floats, change: Floats, system: System) -> None:
                 y[i + c] += change[j + c]
             i, j = i + 3, j + 3
         if motion >= node.SPHERICAL:
-            turn_by(y, i, vector_of(change, j))
+            turn_by(y, i, vector_in(change, j))
         elif motion != node.FIXED:
             y[i] += change[j]
 

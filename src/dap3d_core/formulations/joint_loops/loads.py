@@ -14,7 +14,6 @@ from typing import Any
 
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.evaluate import zero
-from dap3d_core.assembly.turns import vector_of
 from dap3d_core.formulations.joint import node_layout as node
 from dap3d_core.formulations.joint.place import put, times
 from dap3d_core.formulations.joint.reduce import (
@@ -27,7 +26,7 @@ from dap3d_core.formulations.joint.reduce import (
 from dap3d_core.formulations.joint_loops import layout
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
-from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, V, W
+from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, V, W, vector_in
 from dap3d_core.kernels.vectors import add, cross, dot, scale, sub
 
 
@@ -68,7 +67,7 @@ def carry_rows(system: System) -> None:
             end = layout.END_WIDTH * e
             step, block = ends[end + layout.END_STEP], ends[end + layout.END_BLOCK]
             k, at = node.WORK_WIDTH * ways[layout.STEP_WIDTH * step + layout.NODE], step - first
-            apply_rows(D, block, rows, vector_of(K, k + node.CENTRE_NOW), x, 6 * rows * at)
+            apply_rows(D, block, rows, vector_in(K, k + node.CENTRE_NOW), x, 6 * rows * at)
         for step in range(first, cuts[c + layout.LAST_STEP]):
             s = layout.STEP_WIDTH * step
             n, at = ways[s + layout.NODE], 6 * rows * (step - first)
@@ -84,7 +83,7 @@ def carry_rows(system: System) -> None:
                 pass_ball(K, k, rows, x, at, g, place, 6)
             if ways[s + layout.NEXT_STEP] >= 0:
                 up = 6 * rows * (ways[s + layout.NEXT_STEP] - first)
-                carry_on(vector_of(K, k + node.LINK_NOW), rows, x, at, up)
+                carry_on(vector_in(K, k + node.LINK_NOW), rows, x, at, up)
 
 
 @compiled_into
@@ -92,9 +91,9 @@ def apply_rows(D: Floats, block: int, rows: int, arm: Any, x: Floats, at: int) -
     """Add the loads of rows on a body, about the point P of its node; arm: to the mass centre."""
     for r in range(rows):
         d, o = block + 6 * r, at + 6 * r
-        f = vector_of(D, d)
-        put(x, o, add(vector_of(x, o), add(vector_of(D, d + 3), cross(arm, f))))
-        put(x, o + 3, add(vector_of(x, o + 3), f))
+        f = vector_in(D, d)
+        put(x, o, add(vector_in(x, o), add(vector_in(D, d + 3), cross(arm, f))))
+        put(x, o + 3, add(vector_in(x, o + 3), f))
 
 
 @compiled_into
@@ -102,14 +101,14 @@ def pass_axis(
     K: Floats, k: int, rows: int, x: Floats, at: int, g: Floats, place: int, part: int
 ) -> None:
     """Take from loads what the freedom about an axis takes, or along it: of their part 0, or 3."""
-    axis = vector_of(K, k + node.AXIS_NOW)
-    u, v = vector_of(K, k + node.GAIN), vector_of(K, k + node.GAIN + 3)
+    axis = vector_in(K, k + node.AXIS_NOW)
+    u, v = vector_in(K, k + node.GAIN), vector_in(K, k + node.GAIN + 3)
     for r in range(rows):
         o = at + 6 * r
-        along = dot(axis, vector_of(x, o + part))
+        along = dot(axis, vector_in(x, o + part))
         g[place + r] = along
-        put(x, o, sub(vector_of(x, o), scale(along, u)))
-        put(x, o + 3, sub(vector_of(x, o + 3), scale(along, v)))
+        put(x, o, sub(vector_in(x, o), scale(along, u)))
+        put(x, o + 3, sub(vector_in(x, o + 3), scale(along, v)))
 
 
 @compiled_into
@@ -120,8 +119,8 @@ def pass_ball(
     H = nine_of(K, k + node.MATRIX_H)
     for r in range(rows):
         o = at + 6 * r
-        moment = vector_of(x, o)
-        force = sub(vector_of(x, o + 3), transposed_times(H, moment))
+        moment = vector_in(x, o)
+        force = sub(vector_in(x, o + 3), transposed_times(H, moment))
         put(g, place + size * r, moment)
         if size == 6:
             put(g, place + size * r + 3, force)
@@ -134,9 +133,9 @@ def carry_on(link: Any, rows: int, x: Floats, at: int, up: int) -> None:
     """Add loads to those of the parent, about its point; link: from there to P."""
     for r in range(rows):
         o, p = at + 6 * r, up + 6 * r
-        f = vector_of(x, o + 3)
-        put(x, p, add(vector_of(x, p), add(vector_of(x, o), cross(link, f))))
-        put(x, p + 3, add(vector_of(x, p + 3), f))
+        f = vector_in(x, o + 3)
+        put(x, p, add(vector_in(x, p), add(vector_in(x, o), cross(link, f))))
+        put(x, p + 3, add(vector_in(x, p + 3), f))
 
 
 @compiled
@@ -156,16 +155,16 @@ def multiply_loads(system: System) -> None:
             at = profile[layout.PROFILE_WIDTH * (row + r) + layout.PLACE] + column
             count = r + 1 if row == column else pairs[p + layout.RIGHT_COUNT]
             if motion == node.SPHERICAL:
-                n = solve_factored(six_of(K, k + node.FACTORS_BALL), vector_of(g, left + 3 * r))
+                n = solve_factored(six_of(K, k + node.FACTORS_BALL), vector_in(g, left + 3 * r))
                 for e in range(count):
-                    S[at + e] += dot(n, vector_of(g, right + 3 * e))
+                    S[at + e] += dot(n, vector_in(g, right + 3 * e))
             elif motion == node.FREE:
-                n = solve_factored(six_of(K, k + node.FACTORS_FREE), vector_of(g, left + 6 * r))
+                n = solve_factored(six_of(K, k + node.FACTORS_FREE), vector_in(g, left + 6 * r))
                 M = factors_of(six_of(K, k + node.MATRIX_M))
-                f = solve_factored(M, vector_of(g, left + 6 * r + 3))
+                f = solve_factored(M, vector_in(g, left + 6 * r + 3))
                 for e in range(count):
                     o = right + 6 * e
-                    S[at + e] += dot(n, vector_of(g, o)) + dot(f, vector_of(g, o + 3))
+                    S[at + e] += dot(n, vector_in(g, o)) + dot(f, vector_in(g, o + 3))
             else:
                 x = g[left + r] * K[k + node.INVERSE]
                 for e in range(count):
@@ -187,9 +186,9 @@ def lacking_accelerations(system: System) -> None:
             end = layout.END_WIDTH * e
             step, block = ends[end + layout.END_STEP], ends[end + layout.END_BLOCK]
             k = node.WORK_WIDTH * ways[layout.STEP_WIDTH * step + layout.NODE]
-            a = vector_of(K, k + node.ACCELERATION)
-            a = add(a, times(K, k + node.SPIN, vector_of(K, k + node.CENTRE_NOW)))
-            subtract_product(D, block, rows, a, vector_of(K, k + node.ALPHA), right, first)
+            a = vector_in(K, k + node.ACCELERATION)
+            a = add(a, times(K, k + node.SPIN, vector_in(K, k + node.CENTRE_NOW)))
+            subtract_product(D, block, rows, a, vector_in(K, k + node.ALPHA), right, first)
         for step in range(cuts[c + layout.FIRST_STEP], cuts[c + layout.LAST_STEP]):
             subtract_free_rates(system, layout.STEP_WIDTH * step, rows, first)
 
@@ -201,7 +200,7 @@ def subtract_product(
     """Subtract D (a; alpha) of one body."""
     for r in range(rows):
         d = block + 6 * r
-        right[first + r] -= dot(vector_of(D, d), a) + dot(vector_of(D, d + 3), alpha)
+        right[first + r] -= dot(vector_in(D, d), a) + dot(vector_in(D, d + 3), alpha)
 
 
 @compiled_into
@@ -213,13 +212,13 @@ def subtract_free_rates(system: System, s: int, rows: int, first: int) -> None:
     place = ways[s + layout.LOADS]
     if motion == node.SPHERICAL:
         for r in range(rows):
-            right[first + r] -= dot(vector_of(g, place + 3 * r), vector_of(K, k + node.MOMENT))
+            right[first + r] -= dot(vector_in(g, place + 3 * r), vector_in(K, k + node.MOMENT))
     elif motion == node.FREE:
-        a = solve_factored(factors_of(six_of(K, k + node.MATRIX_M)), vector_of(K, k + node.FORCE))
+        a = solve_factored(factors_of(six_of(K, k + node.MATRIX_M)), vector_in(K, k + node.FORCE))
         for r in range(rows):
             o = place + 6 * r
-            along = dot(vector_of(g, o), vector_of(K, k + node.MOMENT))
-            right[first + r] -= along + dot(vector_of(g, o + 3), a)
+            along = dot(vector_in(g, o), vector_in(K, k + node.MOMENT))
+            right[first + r] -= along + dot(vector_in(g, o + 3), a)
     elif motion in (node.REVOLUTE, node.PRISMATIC):
         for r in range(rows):
             right[first + r] -= g[place + r] * K[k + node.FREE_RATE]
@@ -239,7 +238,7 @@ def lacking_velocities(system: System) -> None:
         for e in range(cuts[c + layout.FIRST_END], cuts[c + layout.LAST_END]):
             end = layout.END_WIDTH * e
             o, block = BODY_WIDTH * ends[end + layout.END_BODY], ends[end + layout.END_BLOCK]
-            subtract_product(D, block, rows, vector_of(b, o + V), vector_of(b, o + W), right, first)
+            subtract_product(D, block, rows, vector_in(b, o + V), vector_in(b, o + W), right, first)
 
 
 @compiled
@@ -271,13 +270,13 @@ def push_freedoms(system: System) -> None:
             if motion == node.SPHERICAL:
                 n = sum_of_loads(g, place, 3, rows, x)
                 change = solve_factored(six_of(K, k + node.FACTORS_BALL), n)
-                put(K, k + node.MOMENT, add(vector_of(K, k + node.MOMENT), change))
+                put(K, k + node.MOMENT, add(vector_in(K, k + node.MOMENT), change))
             elif motion == node.FREE:
                 n = sum_of_loads(g, place, 6, rows, x)
                 change = solve_factored(six_of(K, k + node.FACTORS_FREE), n)
-                put(K, k + node.MOMENT, add(vector_of(K, k + node.MOMENT), change))
+                put(K, k + node.MOMENT, add(vector_in(K, k + node.MOMENT), change))
                 f = sum_of_loads(g, place + 3, 6, rows, x)
-                put(K, k + node.FORCE, add(vector_of(K, k + node.FORCE), f))
+                put(K, k + node.FORCE, add(vector_in(K, k + node.FORCE), f))
             elif motion in (node.REVOLUTE, node.PRISMATIC):
                 total = 0.0
                 for r in range(rows):

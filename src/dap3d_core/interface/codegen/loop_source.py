@@ -14,6 +14,7 @@ from typing import Any
 from dap3d_core.interface.codegen.kernel_arguments import KernelArgument, in_order, parameters
 from dap3d_core.interface.codegen.reactions import integers_of_joints, reaction_lines
 from dap3d_core.interface.codegen.type_info import TypeInfo
+from dap3d_core.interface.element_states import state_shape
 from dap3d_core.interface.types import Joint
 
 #: Kinds of loops, with the kernels that each calls.
@@ -167,20 +168,16 @@ def jump_names(
     rows = row_count(outputs, slots) if (kind, kernel) == ("force", "impulse") else 0
     switches = len(outputs.get("switch", ()))
     doc = "1 or -1 where a switch has just changed its sign to that side, else 0"
-    names = {"crossing": KernelArgument("crossing", _shape(switches), True, "", doc=doc)}
+    names = {"crossing": KernelArgument("crossing", state_shape(switches), True, "", doc=doc)}
     if rows:
         doc = "J v of each row before the jump"
-        names["Jv"] = KernelArgument("Jv", _shape(rows), True, "", doc=doc)
+        names["Jv"] = KernelArgument("Jv", state_shape(rows), True, "", doc=doc)
     return names
 
 
 def row_count(outputs: Mapping[str, Sequence[str]], slots: int) -> int:
     """Number of rows of ``J`` of a force, given the numbers that its kernels return."""
     return len(outputs["J"]) // (6 * slots) if "J" in outputs else 0
-
-
-def _shape(count: int) -> tuple[int, ...]:
-    return () if count == 1 else (count,)
 
 
 def jump_lines(type_info: TypeInfo, what: str, *, has_rows: bool) -> Sequence[str]:

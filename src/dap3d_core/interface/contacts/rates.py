@@ -34,9 +34,7 @@ class _RateFunctions:
     """The functions of kernels for numbers with rates."""
 
     def where(self, condition, a, b):
-        """``a`` where the condition holds, else ``b``; tuples item by item."""
-        if isinstance(a, tuple) and isinstance(b, tuple):
-            return tuple(self.where(condition, x, y) for x, y in zip(a, b, strict=True))
+        """``a`` where the condition holds, else ``b``."""
         (v, g), (w, h) = _parts(a), _parts(b)
         return Rate(where(condition.value, v, w), where(condition.value, g, h))
 

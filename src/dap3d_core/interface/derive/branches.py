@@ -45,9 +45,7 @@ class _Functions:
         return lambda *numbers: SymbolicNumber(function(*map(expression_of, numbers)))
 
     def where(self, condition: "SymbolicNumber", a: Any, b: Any) -> Any:
-        """``a`` where the condition holds, else ``b``; tuples item by item."""
-        if isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b):
-            return tuple(self.where(condition, x, y) for x, y in zip(a, b, strict=True))
+        """``a`` where the condition holds, else ``b``."""
         test, x, y = map(expression_of, (condition, a, b))
         if is_condition(x) or is_condition(y):
             return SymbolicNumber((test & x) | (~test & y))

@@ -287,11 +287,7 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
 
 
 def _check_pictures(type_: type[TypeBase], layout: InstanceLayout) -> None:
-    """Check the symbol of a type, and the surfaces of a contact.
-
-    Raises:
-        PluginError: there is no such picture, or the type lacks what it is drawn from.
-    """
+    """Check the symbol of a type, and the surfaces of a contact."""
     surfaces: Mapping[str, str] = getattr(type_, "surfaces", {})
     for slot, kind in surfaces.items():
         declared = f"{where_is(type_)}: surfaces = {{{slot!r}: {kind!r}}}"

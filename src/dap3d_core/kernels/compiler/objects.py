@@ -157,11 +157,7 @@ def compile_ir(
 
 
 def _check_room(size: int) -> None:
-    """Check that there is room for a number of bytes and what LLVM takes besides.
-
-    Raises:
-        MemoryError: there is not; LLVM would end the process.
-    """
+    """Check that there is room for a number of bytes and what LLVM takes besides."""
     try:
         mmap.mmap(-1, size + ROOM).close()
     except OSError:

@@ -73,9 +73,7 @@ class Tracer(Writer):
         return Symbol(self, value)
 
     def where(self, condition: "Symbol", a: Any, b: Any) -> Any:
-        """``a`` where the condition holds, else ``b``; tuples item by item."""
-        if isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b):
-            return tuple(self.where(condition, x, y) for x, y in zip(a, b, strict=True))
+        """``a`` where the condition holds, else ``b``."""
         test = self.cast(None, condition.value, t.BOOL)
         return self.symbol(self.select(None, test, self.value(a), self.value(b)))
 

@@ -3,6 +3,7 @@
 As result/post/force_output.py, by the loops that these call.
 """
 
+from functools import cache
 from typing import Any
 
 import attrs
@@ -82,39 +83,21 @@ class Elements:
         """Args: the run."""
         self._evaluator = prepared.evaluator
         self.calls: list[Call] = []
-        self._known: dict[tuple[str, str], Element | None] = {}
+        #: A joint, None where the formulation has no loop of its rows; a force element; a point of
+        #: a contact. Each is found once.
+        self.joint, self.force = cache(self._joint), cache(self._force)
+        self.contact = cache(self._contact)
         #: Offsets of -lambda, and of scratch.
         self.minus, self.counter = 0, prepared.evaluator.system.multipliers.size
         self._size = self.counter + 1
         #: Made by ``finish``.
         self.arrays = ElementArrays(values=np.zeros(1))
 
-    def joint(self, name: str) -> Element | None:
-        """A joint; None where the formulation has no loop of its rows."""
-        return self._found("joint", name)
-
-    def force(self, name: str) -> Element | None:
-        """A force element."""
-        return self._found("force", name)
-
-    def contact(self, name: str) -> Element:
-        """A point of a contact."""
-        found = self._found("contact", name)
-        assert found is not None  # every one says something
-        return found
-
     def finish(self) -> list[Any]:
         """Arrays and tables that the calls need."""
         self.arrays = ElementArrays(values=np.zeros(self._size))
         parts = [part for call in self.calls for part in (call.table, call.arrays)]
         return [self.arrays, *parts] if self.calls else []
-
-    def _found(self, kind: str, name: str) -> Element | None:
-        key = kind, name
-        if key not in self._known:
-            finds = {"joint": self._joint, "force": self._force, "contact": self._contact}
-            self._known[key] = finds[kind](name)
-        return self._known[key]
 
     def _take(self, size: int) -> int:
         self._size += size

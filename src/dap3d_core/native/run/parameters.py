@@ -94,11 +94,7 @@ def places_of(
 def _trials(
     prepared: PreparedRun, parameter: SceneParameter, value: float, options: dict[str, Any]
 ) -> tuple[list[float], list[PreparedRun]]:
-    """Two other values of a parameter, and the runs with these.
-
-    Raises:
-        SceneError: neither values about its own nor those on one side are accepted.
-    """
+    """Two other values of a parameter, and the runs with these."""
     scene, refused = prepared.compiled.scene, None
     for factors in TRIALS if value else TRIALS_OF_ZERO:
         values = [value * factor if value else factor for factor in factors]

@@ -47,11 +47,7 @@ def refusal(what: str, remedy: str = "") -> SceneError:
 
 
 def _require_bodies(evaluator: Evaluator, what: str) -> None:
-    """Refuse coordinates of joints, in which Python finds what is behind an event.
-
-    Raises:
-        SceneError: they are the coordinates of the run.
-    """
+    """Refuse coordinates of joints, in which Python finds what is behind an event."""
     if not evaluator.coordinates.are_of_bodies:
         raise refusal(
             f"{what}, and Python alone brings that into joint coordinates (method joint, which "

@@ -198,7 +198,16 @@ def write_netcdf(
         with netCDF4.Dataset(part, "a") as file:
             if jacobian:
                 _add_jacobian(file, result)
-            return _contents(file)
+            return [
+                {
+                    "name": name,
+                    "dimensions": list(variable.dimensions),
+                    "shape": list(variable.shape),
+                    "unit": str(getattr(variable, "units", "")),
+                    "meaning": str(getattr(variable, "long_name", "")),
+                }
+                for name, variable in file.variables.items()
+            ]
 
 
 def write_dataset(dataset: "xarray.Dataset", path: Path, *, force: bool) -> None:
@@ -237,16 +246,3 @@ def _add_jacobian(file: Any, result: "Result") -> None:
             dimensions = ("time", "row", "velocity")
             variable = new_variable(file, "Jac", "f8", dimensions, about("SI", meaning))
         variable[k] = rows.value if sparse else rows.dense()
-
-
-def _contents(file: Any) -> list[dict[str, Any]]:
-    return [
-        {
-            "name": name,
-            "dimensions": list(variable.dimensions),
-            "shape": list(variable.shape),
-            "unit": str(getattr(variable, "units", "")),
-            "meaning": str(getattr(variable, "long_name", "")),
-        }
-        for name, variable in file.variables.items()
-    ]

@@ -149,7 +149,14 @@ class ParameterStatics:
         evaluator = self.evaluator
         self.load(s)
         if evaluator.model.state_count:
-            self._check_states(pose)
+            if self._first is None:
+                self._first = pose.u
+            refuse_carried(self.evaluator, self._first, pose.u)
+            if moving := moving_states(self.evaluator, pose.u):
+                raise SimulationError(
+                    f"a path cannot be followed: the rate of {moving} vanishes for no value of the "
+                    "state at a pose"
+                )
         evaluator.count_turns(0.0, pose.u)
         counters, states = evaluator.system.par[self._counted], evaluator.states.copy()
         slopes = self.slopes(s, pose)
@@ -160,15 +167,6 @@ class ParameterStatics:
             return None
         stiffness = np.sort(np.linalg.eigvals(slopes.stiffness).real)
         return PathPoint(s, pose, states, counters, tangent / length, stiffness)
-
-    def _check_states(self, pose: StaticPose) -> None:
-        """Refuse a pose at which states of elements do not come to rest, or keep the way there."""
-        if self._first is None:
-            self._first = pose.u
-        refuse_carried(self.evaluator, self._first, pose.u)
-        if moving := moving_states(self.evaluator, pose.u):
-            raise SimulationError(f"a path cannot be followed: the rate of {moving} vanishes for "
-                                  "no value of the state at a pose")  # fmt: skip
 
     def corrected(
         self, u: Floats, way: Floats, s: float, normal: Floats

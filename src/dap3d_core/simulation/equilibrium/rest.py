@@ -112,11 +112,7 @@ def find_rest(
 
 
 def _hold_contacts(evaluator: Evaluator, u: Floats, where: str) -> None:
-    """Let what touches at a pose of u (13 n,) hold, as far as friction does: the cone problem.
-
-    Raises:
-        SimulationError: bodies overlap, or a contact slips.
-    """
+    """Let what touches at a pose of u (13 n,) hold, as far as friction does: the cone problem."""
     from dap3d_core.formulations.contacts.contact_table import GAP, ContactTable, words_of_drive
     from dap3d_core.formulations.contacts.decide import find_modes_at_rest
 
@@ -170,11 +166,7 @@ def _least(statics: Statics, D: Floats, force: Floats) -> Floats:
 def _with_brought(
     statics: Statics, u: Floats, D: Floats, applied: Floats, multipliers: Floats
 ) -> tuple[Floats, Floats]:
-    """Multipliers and forces (6 n,), with the forces that joints bring: in rigid bearings.
-
-    Raises:
-        SimulationError: they move something, which the search for the pose did not know.
-    """
+    """Multipliers and forces (6 n,), with the forces that joints bring: in rigid bearings."""
     evaluator, force = statics.evaluator, applied
     left = statics.scale * (applied + D.T @ multipliers)
     for _ in range(PASSES):
@@ -195,11 +187,7 @@ def _with_brought(
 
 
 def _let_states_rest(evaluator: Evaluator, search: Search, u: Floats) -> None:
-    """Make the pose of a search from u one at which the states of elements are at rest as well.
-
-    Raises:
-        SimulationError: states do not come to rest, or keep the way there; names them.
-    """
+    """Make the pose of a search from u one at which the states of elements are at rest as well."""
     refuse_carried(evaluator, u, search.pose.u)
     moving = moving_states(evaluator, search.pose.u)
     if not moving:

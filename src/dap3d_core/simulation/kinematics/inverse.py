@@ -314,11 +314,7 @@ def _forces(
 
 
 def _solve(balance: Balance, evaluator: Evaluator, u: Floats, needed: Floats) -> None:
-    """Solve a balance with the forces that depend on multipliers.
-
-    Raises:
-        SimulationError: these forces, and multipliers, do not settle.
-    """
+    """Solve a balance with the forces that depend on multipliers."""
     closed, t, states = balance.closed, balance.t, evaluator.states
     balance.solve(needed)
     guess, taken, rests, rest = balance.Lam, list[Floats](), list[Floats](), np.zeros(0)

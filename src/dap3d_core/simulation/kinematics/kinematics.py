@@ -267,12 +267,7 @@ class _Kinematics:
     # ------------------------------------------------------------------ the start
 
     def _start(self) -> InitialState:
-        """The assembled start, where no freedom is left.
-
-        Raises:
-            SimulationError: freedoms are left, redundant rows contradict each other, or the pose is
-                singular.
-        """
+        """The assembled start, where no freedom is left."""
         settings, compiled = self.settings, self.compiled
         start = compiled.start(True, settings.hold, str(settings.correct_metric))
         self.notes += start_notes(start, self.evaluator, compiled.scene)

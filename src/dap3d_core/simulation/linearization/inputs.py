@@ -114,9 +114,6 @@ def _by_input(
 
     Returns:
         where its number is.
-
-    Raises:
-        UnknownNameError: velocities of a driver jump with it, or a force on reactions reads it.
     """
     model, start = point.model, point.model.joint_start
     row = int(model.input_rows[model.input_names.index(name)])

@@ -401,11 +401,7 @@ class ParameterMap:
 
 
 def _point_fields(checked: ValidatedScene, instance: Instance, point: str) -> Iterator[str]:
-    """Fields of an element that hold the coordinates of a declared point.
-
-    Raises:
-        NotCopiedError: the point is in a list of points.
-    """
+    """Fields of an element that hold the coordinates of a declared point."""
     fields, vectors2 = instance.fields, checked.scene.vectors2
     if any(isinstance(v, list | tuple) and point in v for v in fields.values()):
         raise NotCopiedError

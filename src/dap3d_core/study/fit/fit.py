@@ -190,11 +190,7 @@ def _output_mistakes(
 
 
 def _predictor(task: _Task, threads: int | None, announce: Announce | None) -> Predictor:
-    """A predictor with runs that report at the measured times, or finely enough between them.
-
-    Raises:
-        SimulationError: the run at the start fails.
-    """
+    """A predictor with runs that report at the measured times, or finely enough between them."""
     t, last = task.data.t, task.study.scene.simulation.t_end or 0.0
     common = common_step(np.append(t, last))
     step = common / -(-MIN_STEPS // round(last / common)) if common else last / MIN_STEPS

@@ -286,9 +286,6 @@ class DifferentiatedRun(Run):
         """Where a contact begins to slide from rest, the least slip decides in which direction.
 
         slopes: (size, p) derivatives of the state there.
-
-        Raises:
-            SimulationError: a parameter gives it some.
         """
         of, put, y = self.jumps, self._putting(), self.present.work.state[Y].copy()
         assert of is not None

@@ -119,11 +119,7 @@ class Objective:
         return CompiledModel(scene, method=method, registry=registry, allow_code=allow_code)
 
     def _named(self, quantity: str, of: str, allow_code: bool) -> str:
-        """The name of the quantity; of an expression that of an output that it becomes.
-
-        Raises:
-            SceneError: there is no such quantity, and it is no expression either.
-        """
+        """The name of the quantity; of an expression that of an output that it becomes."""
         compiled = self._compiled(self._scene, allow_code)
         probe = probe_of(compiled.scene_text, compiled.evaluator)
         try:
@@ -189,9 +185,6 @@ def _in_jax(
 
     Args:
         objective, both: the value; value and gradient.
-
-    Raises:
-        ImportError: JAX is not installed.
     """
     try:
         import jax
@@ -230,9 +223,6 @@ def _in_torch(
 
     Args:
         objective, both: the value; value and gradient.
-
-    Raises:
-        ImportError: PyTorch is not installed.
     """
     try:
         import torch

@@ -154,16 +154,6 @@ def _fits_file(name: str) -> bool:
     return "/" not in name and name == name.strip() and (first.isalnum() or first == "_")
 
 
-def _check_space(ensemble: Ensemble, plan: Design, output: str | os.PathLike[str] | None) -> None:
-    """Refuse what fits neither into memory nor on the disk."""
-    series = [o for o in ensemble.outputs if o.reduction == "series"]
-    width = 8 * (len(ensemble.outputs) + len(series) * (len(ensemble.times) - 1))
-    width *= 1 + len(plan.varied) * ensemble.study.gradients
-    # in addition status and note; in memory the points, three times while they are drawn
-    width += 1 + (NOTE if output is not None else 8 + 3 * 8 * len(plan.varied))
-    check_room_of_points(plan.size, width, output)
-
-
 @attrs.frozen(eq=False)
 class _Runner:
     """Runs points here or on a cluster; attributes as the arguments of ``sweep``."""
@@ -183,7 +173,12 @@ class _Runner:
         ensemble = _ensemble(study, self.announce)
         _check_names(ensemble, plan, in_file=output is not None)
         if not self.force:
-            _check_space(ensemble, plan, output)
+            series = [o for o in ensemble.outputs if o.reduction == "series"]
+            width = 8 * (len(ensemble.outputs) + len(series) * (len(ensemble.times) - 1))
+            width *= 1 + len(plan.varied) * ensemble.study.gradients
+            # in addition status and note; in memory the points, three times while they are drawn
+            width += 1 + (NOTE if output is not None else 8 + 3 * 8 * len(plan.varied))
+            check_room_of_points(plan.size, width, output)
         if self.client is None:
             ensemble.prepare()
         points = plan.points()

@@ -158,9 +158,6 @@ def _answers(client: Any, payload: bytes) -> dict[str, Any]:
     """The environment of each worker, or the exception that it raised, by address.
 
     Workers that are lost meanwhile have no say; where all are, others are waited for.
-
-    Raises:
-        ClusterError: there are no workers.
     """
     while True:
         with _requests(client):

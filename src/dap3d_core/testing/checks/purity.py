@@ -2,6 +2,7 @@
 
 import builtins
 import dis
+import operator
 import random
 import sys
 import types
@@ -183,6 +184,10 @@ class _BranchError(TypeError):
     """A kernel branches on a condition on its numbers."""
 
 
+def _joined(operation: Callable[[Any, Any], Any]) -> Callable[[Any, Any], "_Condition"]:
+    return lambda self, other: _Condition(operation(self.holds, getattr(other, "holds", other)))
+
+
 class _Condition:
     """A comparison of numbers with a result that only the functions of kernels may read."""
 
@@ -197,19 +202,12 @@ class _Condition:
             raise _BranchError("a branch on a number")
         return bool(self.holds)
 
-    def __and__(self, other: Any) -> "_Condition":
-        return _Condition(self.holds & getattr(other, "holds", other))
-
-    def __or__(self, other: Any) -> "_Condition":
-        return _Condition(self.holds | getattr(other, "holds", other))
-
-    def __xor__(self, other: Any) -> "_Condition":
-        return _Condition(self.holds ^ getattr(other, "holds", other))
+    __and__ = __rand__ = _joined(operator.and_)
+    __or__ = __ror__ = _joined(operator.or_)
+    __xor__ = __rxor__ = _joined(operator.xor)
 
     def __invert__(self) -> "_Condition":
         return _Condition(not self.holds)
-
-    __rand__, __ror__, __rxor__ = __and__, __or__, __xor__
 
 
 def _compared(name: str) -> Callable[[Any, Any], _Condition]:

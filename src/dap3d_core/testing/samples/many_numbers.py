@@ -17,9 +17,7 @@ class _Functions:
     """The functions of kernels."""
 
     def where(self, condition: Any, a: Any, b: Any) -> Any:
-        """``a`` where the condition holds, else ``b``; tuples item by item."""
-        if isinstance(a, tuple) and isinstance(b, tuple):
-            return tuple(self.where(condition, x, y) for x, y in zip(a, b, strict=True))
+        """``a`` where the condition holds, else ``b``."""
         kind = Condition if isinstance(a, Condition) or isinstance(b, Condition) else Many
         return kind(np.where(condition.value, _value(a), _value(b)))
 
