@@ -21,6 +21,8 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 #: Slow cases of one test that CI verifies, about; the others are long.
 MOST_CASES = 4
+#: Folders whose slow cases CI all verifies: commands, and numbers of shipped models.
+WHOLE = ("e2e", "models")
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -96,7 +98,7 @@ def pytest_collection_modifyitems(items):
             if k % n:
                 item.add_marker("slow")
     for found in _families(i for i in items if i.get_closest_marker("slow")):
-        n = 1 if "/e2e/" in found[0].path.as_posix() else ceil(len(found) / MOST_CASES)
+        n = 1 if found[0].path.parent.name in WHOLE else ceil(len(found) / MOST_CASES)
         for item in found:
             if crc32(item.nodeid.encode()) % n:
                 item.add_marker("long")
