@@ -117,7 +117,7 @@ def test_tensions_of_a_platform_are_those_of_newton_and_euler(number):
 
 def test_the_motion_of_a_run_has_its_states_and_inputs():
     """A driven body that a spring and damper in series and a sampled input pull: D = m x'' - F - u,
-    with the damper's z' = a (e - z) in closed form. Its error is that of the run's states, 1e-10."""
+    with the damper's z' = a (e - z) in closed form. Limit: errors of the run's states, 1e-10."""
     k, c, X, w = 100.0, 20.0, 0.2, 5.0
     scene = dap.Scene()
     scene.add_body("b", mass=2.0, Jp=(1.0, 1.0, 1.0))

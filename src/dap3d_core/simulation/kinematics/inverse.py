@@ -137,11 +137,12 @@ def inverse(
     Args:
         scene: a Scene, what ``load`` takes, or a compiled model.
         motion: a ``Result`` with the same bodies, from which positions, velocities and
-            accelerations are taken, and states of elements and inputs of the same names; or positions over time: {"t": times, "platform.r.x": values},
-            a data frame, an xarray.Dataset or the path of a CSV file with a header, whose columns
-            are quantities that positions determine (body.r.x, body.p.e1, point.r.z, force.length).
-            The motion is the nearest to them, by least squares, that the joints allow; its rates
-            are those of splines of degree 5 through its positions.
+            accelerations are taken, and states of elements and inputs of the same names; or
+            positions over time: {"t": times, "platform.r.x": values}, a data frame, an
+            xarray.Dataset or the path of a CSV file with a header, whose columns are quantities
+            that positions determine (body.r.x, body.p.e1, point.r.z, force.length). The motion is
+            the nearest to them, by least squares, that the joints allow; its rates are those of
+            splines of degree 5 through its positions.
         actuators: names of drivers (which then prescribe nothing) and of force elements whose type
             says what it ``actuates``; by default all drivers.
         progress, allow_code, announce, output, force: as of ``kinematics``.
