@@ -213,7 +213,8 @@ def turn_contacts(
 ) -> bool:
     """Take rows of what collides at its instant, others halfway if any turns; False without room.
 
-    Normals of the start of the step made oblique impacts of the first order.
+    Normals of the start of the step made oblique impacts of the first order. Rows of joints stay
+    those of the start, as states of elements and the work of what joints turn have them.
     """
     if any_collides:
         struck = free_motion.put_struck(work, s)
@@ -223,7 +224,7 @@ def turn_contacts(
     if turns:
         t, middle = work.t + 0.5 * s.h, free_motion.put_middle(work, s)
         return contact_set.turn_rows(t, middle, False, s, system, loops)
-    if not any_collides and s.declared_gap.size == 0 and s.y.size > 0:
+    if s.y.size > 0 and (any_collides or s.declared_gap.size == 0):
         contact_set.evaluate_rows(work.t, work.state[at.Y], False, s, system, loops)
     return True
 
