@@ -229,3 +229,28 @@ def test_pendulums_pass_an_impact_on(declared):
     assert x[4] == pytest.approx(np.sin(angle), abs=4.0 * h**2)
     assert abs(x[:4]).max() < 4.0 * h**2
     assert abs(result.rd[-1]).max() < 20.0 * h**2
+
+
+def test_an_arm_meets_a_floor_by_its_joints_of_that_instant():
+    """Two links that fall onto their tip; limit: (w h)^2 / 8 of its 3 m/s, w = 15 rad/s.
+
+    With rows of contacts or of joints of the start of the step it was off by 2.9e-3 m/s.
+    """
+    scene = dap.Scene(name="arm")
+    scene.add_force("weight", "gravity")
+    ends = {"ground": [0.0, 0.0, 0.3], "upper": [0.1, 0.0, 0.0], "lower": [0.1, 0.0, 0.0]}
+    for holder, name, x in (("ground", "upper", 0.1), ("upper", "lower", 0.3)):
+        scene.add_body(name, mass=1.0, Jp=[0.02] * 3, r=[x, 0.0, 0.3])
+        scene.add_point(f"{name}_hinge", holder, ends[holder])
+        scene.add_point(f"{name}_eye", name, [-0.1, 0.0, 0.0])
+        scene.add_joint("rev", f"{name}_pin", P_i=f"{name}_eye", P_j=f"{name}_hinge",
+                        a_i=f"{name}.y", a_j=f"{holder}.y")  # fmt: skip
+    scene.add_point("tip", "lower", ends["lower"])
+    scene.add_contact("ball_plane", "floor", P_i="tip", radius=0.02, mu=0.3, e=0.5, law="newton")
+    h = 1e-3
+    exact, found = (
+        dap.simulate(scene, t_end=0.32, dt=0.32, contact=contact, contact_step=step, **TIGHT)
+        for contact, step in (("events", None), ("stepping", h))
+    )
+    assert [event.kind for event in exact.events] == ["impact"]
+    assert found.rd[-1] == pytest.approx(exact.rd[-1], abs=3.0 * (15.0 * h) ** 2 / 8.0)

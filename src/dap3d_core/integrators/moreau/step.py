@@ -213,8 +213,7 @@ def turn_contacts(
 ) -> bool:
     """Take rows of what collides at its instant, others halfway if any turns; False without room.
 
-    Normals of the start of the step made oblique impacts of the first order. Rows of joints stay
-    those of the start, as states of elements and the work of what joints turn have them.
+    Normals of the start of the step made oblique impacts of the first order.
     """
     if any_collides:
         struck = free_motion.put_struck(work, s)
@@ -224,7 +223,7 @@ def turn_contacts(
     if turns:
         t, middle = work.t + 0.5 * s.h, free_motion.put_middle(work, s)
         return contact_set.turn_rows(t, middle, False, s, system, loops)
-    if s.y.size > 0 and (any_collides or s.declared_gap.size == 0):
+    if not any_collides and s.declared_gap.size == 0 and s.y.size > 0:
         contact_set.evaluate_rows(work.t, work.state[at.Y], False, s, system, loops)
     return True
 
@@ -282,16 +281,22 @@ def carry_on(work: Any, s: StepArrays) -> None:
 
 @compiled
 def keep_pushed(work: Any, s: StepArrays) -> None:
-    """Keep the accelerations that contacts have given; those of impacts do not go on."""
+    """Keep the accelerations that contacts have given; those of impacts do not go on.
+
+    A step is steady where these are expected ones, by which bodies have gone in free motion.
+    """
     s.is_steady = 1 if work.pushed[0, 0] != 0.0 else 0
     work.pushed[0, 0] = 0.0
     for b in range(1, s.end.shape[0]):
         s.is_steady = 0 if s.hit[b] != restitution.NOT_HIT else s.is_steady
         for k in range(6):
             change = s.end[b, k] - s.free[b, k] if s.hit[b] == restitution.NOT_HIT else 0.0
+            s.change[k] = change - s.h * work.pushed[b, k]
             work.pushed[b, k] = change / s.h
             if change != 0.0:
                 work.pushed[0, 0] = 1.0
+        way = s.h * (length_of(s.change, 0) + s.length * length_of(s.change, 3))
+        s.is_steady = 0 if way > TURNING * s.length else s.is_steady
 
 
 @compiled
