@@ -254,3 +254,20 @@ def test_an_arm_meets_a_floor_by_its_joints_of_that_instant():
     )
     assert [event.kind for event in exact.events] == ["impact"]
     assert found.rd[-1] == pytest.approx(exact.rd[-1], abs=3.0 * (15.0 * h) ** 2 / 8.0)
+
+
+@pytest.mark.slow
+@long_in_plain_python
+def test_rough_balls_that_fall_on_each_other_are_solved_to_the_tolerance():
+    """180 balls: velocities that rounds ask for lie on rims of cones, where it ended at 8e-7."""
+    scene, rng = dap.Scene(name="pile"), np.random.default_rng(0)
+    for i, j, k in np.ndindex(6, 6, 5):
+        x, y = [0.21 * i + 0.02 * rng.random(), 0.21 * j + 0.02 * rng.random()]
+        add_ball(scene, f"b{i}_{j}_{k}", [x, y, 0.12 + 0.25 * k])
+    scene.add_shape("box", body="ground", at=[0.6, 0.6, -0.5], size=[6.0, 6.0, 1.0], collides=True)
+    scene.add_material("rubber", e=0.5, mu=0.4)
+    scene.add_collisions(material="rubber")
+    scene.add_force("weight", "gravity")
+    result = dap.simulate(scene, t_end=0.6, dt=0.1, contact_step=2e-3, rtol=1e-8)
+    assert result.ledger["residual"].value < 1e-8
+    assert all(entry.ok for entry in result.ledger.values())

@@ -157,7 +157,7 @@ def compile_ir(
 
 
 def _check_room(size: int) -> None:
-    """Check that there is room for a number of bytes and what LLVM takes besides."""
+    """Refuse what there is no room for, with what LLVM takes besides: it would end the process."""
     try:
         mmap.mmap(-1, size + ROOM).close()
     except OSError:
